@@ -96,7 +96,7 @@ fn kernels(profiles: &[&str], values: bool) -> Vec<Kernel> {
                     .iter()
                     .filter(|(id, _)| id.category == category)
                     .map(|(id, plan)| (id.key, plan.generator().expect("a plan of samples").scene()));
-                let any = ("any".into(), DeviceScene::unknown(category == Category::CutOut));
+                let any = ("any", DeviceScene::unknown(category == Category::CutOut));
                 for (scene_name, scene) in of_samples.chain([any]) {
                     let specialization = shader::Specialization { scene, values, queue: true };
                     let constants = shader::constants(&resolved, model, specialization);
@@ -127,7 +127,7 @@ fn sampled_plans(samples: u64) -> Vec<(Parameterization, LanePlan)> {
         let options = SampleOptions::new(Estimator::CRUDE, samples, headways);
         let profile = Profile::load("paper").expect("a profile");
         let mixture = density.mixture().expect("a mixture");
-        (density.space.id().clone(), plan_samples(&density, &mixture, &profile, &options).expect("a plan"))
+        (*density.space.id(), plan_samples(&density, &mixture, &profile, &options).expect("a plan"))
     };
     keys.into_iter().map(plan).collect()
 }

@@ -156,7 +156,7 @@ impl StudyReport<'_> {
 fn variants_table(scores: &CategoryScores) -> Table {
     let known = scores.variants.iter().skip(1).filter_map(|key| Parameterization::find(scores.category, key));
     Table::of(&known.collect::<Vec<_>>())
-        .column("parameterization", |id| id.key.to_string())
+        .column("parameterization", |id| id.key)
         .column("what is kept", |id| id.description())
         .column("kind", |id| id.family.name())
         .column("parameters beside the headway", |id| id.parameter_count())

@@ -377,7 +377,7 @@ fn the_point_of_a_scenario_gives_the_case_that_the_study_makes_of_it() {
         let options = ParameterizationOptions { svd_lateral, ..ParameterizationOptions::default() };
         let mut compared = 0;
         for id in Parameterization::ALL {
-            let space = space(id.clone(), &options, true);
+            let space = space(id, &options, true);
             for scenario in kept(id.category) {
                 let what = format!("{} under {}", scenario.id, id.key);
                 let point = space.point(scenario).unwrap();
@@ -633,7 +633,7 @@ fn mixtures_come_back_from_files_and_are_judged_by_unseen_scenarios() {
         let id = Parameterization::find(category, key).unwrap();
         let fit = |kind| {
             let options = FitOptions { kind, valid_draws: 20_000, ..FitOptions::default() };
-            DensityModel::fit(id.clone(), scenarios(), &facts(), &options).unwrap().model
+            DensityModel::fit(id, scenarios(), &facts(), &options).unwrap().model
         };
         let kernels = fit(DensityKind::Kernel);
         for kind in [DensityKind::Mixture, DensityKind::Copula] {

@@ -53,7 +53,7 @@ fn every_draw_starts_and_ends_in_the_lanes_of_its_category_and_drives_at_a_speed
     let profile = Profile::load("paper").unwrap();
     for id in Parameterization::ALL.into_iter().filter(|id| id.coefficients().is_some()) {
         for svd_lateral in [SvdLateral::Signed, SvdLateral::Mirrored] {
-            let density = density(id.clone(), options(svd_lateral));
+            let density = density(id, options(svd_lateral));
             let mixture = density.mixture().unwrap();
             let source = SampleSource::Random;
             let generator = generator_of(&density.space, &mixture, &density.sizes, &profile, source, 7).unwrap();
@@ -79,7 +79,7 @@ fn every_draw_starts_and_ends_in_the_lanes_of_its_category_and_drives_at_a_speed
 fn densities_of_one_side_lose_few_draws_and_those_of_both_sides_many() {
     for id in Parameterization::ALL.into_iter().filter(|id| id.coefficients().is_some() && id.category != Category::Lvd)
     {
-        let [both, one] = [SvdLateral::Signed, SvdLateral::Mirrored].map(|s| density(id.clone(), options(s)));
+        let [both, one] = [SvdLateral::Signed, SvdLateral::Mirrored].map(|s| density(id, options(s)));
         let (both, one) = (misplaced(&both), misplaced(&one));
         eprintln!("{}: {:.2} % signed, {:.2} % mirrored", id.name(), 100.0 * both, 100.0 * one);
         assert!(one < 0.02, "{}: {one}", id.name());

@@ -1,14 +1,9 @@
 //! Folds of a cross-validation: scenarios of one recording stay together, because neighbours in time resemble each other.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use crate::scenario::Scenario;
 use crate::{Error, Place, Result};
-
-/// Whether there are enough recordings, so that each stays whole.
-fn is_by_recording(scenarios: &[&Scenario], count: usize) -> bool {
-    scenarios.iter().map(|scenario| &scenario.recording).collect::<BTreeSet<_>>().len() >= count
-}
 
 /// The fold of each scenario, below `count`. Recordings go to the fold with the fewest scenarios, the largest first. Fewer
 /// recordings than folds are cut into as many stretches of time.
@@ -20,13 +15,12 @@ pub(super) fn folds(scenarios: &[&Scenario], count: usize) -> Result<Vec<usize>>
         let problem = format!("{} scenarios cannot be divided into {count} folds", scenarios.len());
         return Err(Error::usage(Place::item("[study] folds"), problem, "use fewer folds, or more data"));
     }
-    let by_recording = is_by_recording(scenarios, count);
     let mut recordings: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
     for (at, scenario) in scenarios.iter().enumerate() {
         recordings.entry(&scenario.recording).or_default().push(at);
     }
     let mut of = vec![0; scenarios.len()];
-    if !by_recording {
+    if recordings.len() < count {
         let mut order: Vec<usize> = (0..scenarios.len()).collect();
         let key = |at: usize| (&scenarios[at].recording, scenarios[at].frame0, &scenarios[at].id);
         order.sort_by(|a, b| key(*a).cmp(&key(*b)));
@@ -46,6 +40,8 @@ pub(super) fn folds(scenarios: &[&Scenario], count: usize) -> Result<Vec<usize>>
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
     use crate::scenario::Category;
     use crate::traffic::mining::{MiningOptions, mine_generated};

@@ -253,6 +253,7 @@ impl Parameterization {
         Err(Error::Internal(format!("{} is no {}", scenario.id, self.category.label())))
     }
 
+    /// The given decomposition, which an SVD needs.
     fn needed<'a>(&self, reduction: Option<&'a Reduction>) -> Result<&'a Reduction> {
         reduction.ok_or_else(|| Error::Internal(format!("{} needs a decomposition", self.name())))
     }
