@@ -131,6 +131,14 @@ def test_the_cases_of_a_pair_have_two_answers_of_check() -> None:
     assert nearer.filter(pl.col("id").str.starts_with("outside")).height == 1
 
 
+def test_a_case_that_is_none_is_named() -> None:
+    without_gap = {name: value for name, value in CASE.items() if name != "gap_m"}
+    with pytest.raises(lanesweep.InputError, match="the initial distance is missing"):
+        recipes.variations(without_gap, {"speed_kmh": (20, 40)}, inside=4, boundary=0)
+    with pytest.raises(ValueError, match="ego_speed_kmh"):
+        recipes.uncertain({"category": "lvd", "ego_speed": "60km/h", "gap": 9, "acceleration": -6}, {"ego_speed": 1})
+
+
 def test_uncertain_shares_are_those_of_the_verb_that_they_replace() -> None:
     errors = {"gap_m": 1, "ego_speed_kmh": 2, "speed_kmh": 2, "lateral_speed": 0.1}
     found = recipes.uncertain(CASE, errors)
@@ -176,12 +184,21 @@ def test_a_justification_has_the_scores_and_intervals_of_the_study(study: tuple[
         assert found.hidden.height == of["fn"] and not found.hidden[f"{criterion}_parameterized"].any()
 
 
+def test_the_rows_may_be_csv(study: tuple[pl.DataFrame, pl.DataFrame], tmp_path: Path) -> None:
+    lanes = study[0].with_columns(pl.col("collision", "ttc", "btn").cast(pl.Int64))
+    lanes.write_csv(tmp_path / "lanes.csv")
+    found = [recipes.justification(of, "ii", model="Reg157").scores for of in (study[0], tmp_path / "lanes.csv")]
+    assert found[0].equals(found[1])
+
+
 def test_limits_are_the_users_and_an_interval_over_a_limit_is_undecided(study: tuple[pl.DataFrame, pl.DataFrame]) -> None:
     limits = {"recall": (0.0, 1.0), "precision": (1.0, 1.0), "F1": (0.0, 0.01)}
     found = recipes.justification(study[0], "i", model="Reg157", criterion="ttc", limits=limits).scores
     assert dict(found.select("quantity", "within").iter_rows()) == {
         "recall": "yes", "precision": "undecided", "F1": "no", "S'/S": None,
     }  # fmt: skip
+    with pytest.raises(ValueError, match="there is no f1; there are recall"):
+        recipes.justification(study[0], "i", model="Reg157", limits={"f1": (0.9, 1)})
     with pytest.raises(ValueError, match="no parameterization"):
         recipes.justification(study[0], "1", model="Reg157")
 

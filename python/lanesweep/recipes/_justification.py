@@ -58,6 +58,8 @@ def justification(
     counts = both.group_by("id", maintain_order=True).agg(**{name: of.sum() for name, of in sums.items()})
     tp, fn, fp, runs = (counts[name].cast(pl.Int64).to_numpy() for name in sums)
     scores = _scores(tp, fn, fp, runs, level)
+    if unknown := set(limits or {}) - set(scores):
+        raise ValueError(f"there is no {', '.join(unknown)}; there are {', '.join(scores)}")
     inside = {name: _within(scores[name], ends) for name, ends in (limits or {}).items()}
     rows_of = [(name, *value, inside.get(name)) for name, value in scores.items()]
     schema = {"quantity": pl.String, "value": pl.Float64, "low": pl.Float64, "high": pl.Float64, "within": pl.String}

@@ -121,11 +121,12 @@ def largest_gap(
     """
     with extra():
         import polars as pl
+        import polars.selectors as select
         from statsmodels.stats.proportion import proportion_confint
     cases = table(points)
     likely = None if draws is None else table(draws)
     found = []
-    for name in ranges or cases.columns:
+    for name in ranges or cases.select(select.numeric()).columns:
         values = cases[name].drop_nulls().to_numpy().astype(np.float64)
         low, high = ranges[name] if ranges else (values.min(), values.max())
         ends = np.sort(np.r_[low, values[(values > low) & (values < high)], high])

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import _verbs
+from .._core import InputError
 from .._result import temporary
 from ..options import Path as PathLike
 
@@ -26,10 +27,22 @@ def extra() -> Iterator[None]:
         raise ImportError(f"{error.name} is missing: pip install 'lanesweep[recipes]'", name=error.name) from error
 
 
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Log nothing."""
+    log = logging.getLogger("lanesweep")
+    level = log.level
+    log.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        log.setLevel(level)
+
+
 def table(rows: Any) -> pl.DataFrame:
     """Return a table of lanesweep, pandas, Polars or pyarrow, columns by their names, or a file (.csv, .jsonl, .parquet).
 
-    NaN is no value.
+    NaN is no value. Verdicts, which are 0 and 1 in CSV, become true and false.
     """
     with extra():
         import polars as pl
@@ -41,7 +54,8 @@ def table(rows: Any) -> pl.DataFrame:
         else:
             rows = pl.read_parquet(path) if path.suffix == ".parquet" else pl.read_ndjson(path, infer_schema_length=None)
     found = pl.DataFrame(dict(rows) if isinstance(rows, Mapping) else rows, strict=False)
-    return found.with_columns(select.float().fill_nan(None))
+    verdicts = select.by_name("collision", "ttc", "btn", require_all=False) & select.integer()
+    return found.with_columns(select.float().fill_nan(None), verdicts.cast(pl.Boolean))
 
 
 def answers(cases: pl.DataFrame, profile: PathLike) -> pl.DataFrame:
@@ -51,13 +65,13 @@ def answers(cases: pl.DataFrame, profile: PathLike) -> pl.DataFrame:
     keep = temporary()
     file, found = Path(keep.name) / "cases.parquet", Path(keep.name) / "answers.parquet"
     cases.write_parquet(file)
-    log = logging.getLogger("lanesweep")
-    level = log.level
-    # A draw that is no case is counted, not reported.
-    log.setLevel(logging.CRITICAL)
     try:
-        _verbs.check(file, nominal=True, profiles=profile, rows=found)
-    finally:
-        log.setLevel(level)
+        # A draw that is no case is counted, not reported.
+        with quiet():
+            _verbs.check(file, nominal=True, profiles=profile, rows=found)
+    except InputError:
+        # No row is a case: say what is wrong with the first one.
+        _verbs.check(file, row=1, profiles=profile)
+        raise
     every = pl.DataFrame({"row": range(1, len(cases) + 1)}, schema={"row": pl.Int64})
     return every.join(pl.read_parquet(found), on="row", how="left", maintain_order="left").drop("row")

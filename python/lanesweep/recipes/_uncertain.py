@@ -53,6 +53,8 @@ def uncertain(
         from scipy import stats
     generator = np.random.default_rng(seed)
     known = {name: stats.norm(scale=error) if np.isscalar(error) else error for name, error in errors.items()}
+    if texts := [name for name in known if isinstance(case[name], str)]:
+        raise ValueError(f"{', '.join(texts)}: what has an error is a number; write the unit into the name: ego_speed_kmh")
     drawn = {name: case[name] + error.rvs(draws, random_state=generator) for name, error in known.items()}
     cases = pl.DataFrame({**case, **drawn})
     found = answers(cases, profile)
