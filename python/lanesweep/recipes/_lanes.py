@@ -13,13 +13,6 @@ from ._shared import extra, table
 if TYPE_CHECKING:
     import polars as pl
 
-#: Most severe last, by the criterion: columns of the rows, and whether larger is worse.
-_SEVERITY = {
-    "collision": (("impact_closing_speed_mps", True), ("min_ttc_s", False)),
-    "ttc": (("min_ttc_s", False),),
-    "btn": (("max_btn", True),),
-}
-
 
 def failure_map(rows: Any, x: str, y: str, *, criterion: str = "collision", bins: int = 20) -> pl.DataFrame:
     """Count lanes and failures over two parameters, per driver: a row per cell with lanes; its range is from `…_low` to `…_high`.
@@ -48,11 +41,13 @@ def worst(rows: Any, count: int = 20, *, criterion: str = "collision") -> pl.Dat
 
     `rows` are those of `sample(failures=…)`, `sample(rows=…)` or `simulate`.
     """
-    lanes = table(rows)
-    columns = [name for name, _ in _SEVERITY[criterion]]
-    down = [is_larger for _, is_larger in _SEVERITY[criterion]]
-    ordered = lanes.sort("model", *columns, descending=[False, *down], nulls_last=True, maintain_order=True)
-    return ordered.group_by("model", maintain_order=True).head(count)
+    with extra():
+        import polars as pl
+    near = pl.col("min_ttc_s")
+    # The smallest is the worst.
+    order = {"collision": [-pl.col("impact_closing_speed_mps").abs(), near], "ttc": [near], "btn": [-pl.col("max_btn")]}
+    lanes = table(rows).sort("model", *order[criterion], nulls_last=True, maintain_order=True)
+    return lanes.group_by("model", maintain_order=True).head(count)
 
 
 class InjuryCurve(NamedTuple):
@@ -111,9 +106,7 @@ def injury_risk(delta_v_mps: npt.ArrayLike, curve: str = "nhtsa-2022-frontal-mai
     return np.where(change <= of.valid_to_mps, risk, np.nan)
 
 
-def largest_gap(
-    points: Any, ranges: Mapping[str, tuple[float, float]] | None = None, *, draws: Any = None
-) -> pl.DataFrame:
+def largest_gap(points: Any, ranges: Mapping[str, tuple[float, float]] | None = None, *, draws: Any = None) -> pl.DataFrame:
     """Return per quantity the largest interval of its range without a point, whatever the other quantities are.
 
     `ranges` are by default those of the points. With `draws` of a density (`LimitState.draw`), `exposure` is the fraction of them inside,

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import _verbs
-from ..options import Category, Criterion
+from ..options import Criterion
 from ._shared import extra, quiet, table
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def found_emphasis(
     z, category = _vectors(rows), _category(rows)
     series, numbers = _LAYOUT[category]
     data: Any = rows
-    folds = table(_verbs.study(scenarios=data, categories=_word(category), cross_validate=True).table("folds"))
+    folds = table(_verbs.study(scenarios=data, cross_validate=True).table("folds"))
     fold = rows.join(folds, left_on="id", right_on="scenario", how="left", maintain_order="left")["fold"].to_numpy()
     start = [0.0] * (KNOTS * len(series) + len(numbers))
     search = cma.CMAEvolutionStrategy(start, 0.7, {"popsize": 12, "seed": seed, "bounds": [-8, 8], "verbose": -9})
@@ -107,11 +107,6 @@ def _category(rows: pl.DataFrame) -> str:
     return str(found)
 
 
-def _word(category: str) -> Category:
-    words: dict[str, Category] = {"cut_in": "cut-in", "cut_out": "cut-out", "lvd": "lvd"}
-    return words[category]
-
-
 def _scenarios(rows: pl.DataFrame, z: Array) -> pl.DataFrame:
     """The scenarios of vectors, with sizes and sides of the rows."""
     import polars as pl
@@ -139,7 +134,7 @@ def _scores(rows: pl.DataFrame, described: Mapping[str, pl.DataFrame], criterion
     data: Any = rows
     # A bad proposal jumps sideways, and is scored all the same.
     with quiet():
-        study = _verbs.study(scenarios=data, categories=_word(_category(rows)), external=described, accept_implausible=True)
+        study = _verbs.study(scenarios=data, external=described, accept_implausible=True)
     judged = table(study.table("f1")).filter((pl.col("criterion") == criterion) & (pl.col("failing_scenarios") >= 10))
     means = judged.group_by("parameterization").agg(pl.col("f1").fill_null(0.0).mean())
     by_name = dict(means.iter_rows())

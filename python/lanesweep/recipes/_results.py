@@ -67,8 +67,9 @@ def compare_results(
     if both.height < results.height:
         raise ValueError(f"{results.height - both.height} results have the id of no case")
     most = {name: by for name, by in tolerances.items() if name in results.columns} | {"collision": 0.0}
+    pairs = {name: (pl.col(name), pl.col(f"{name}_ours")) for name in most}
     # Infinite minus infinite is no difference.
-    minus = {name: pl.when(pl.col(name) == pl.col(f"{name}_ours")).then(0.0).otherwise(pl.col(name) - pl.col(f"{name}_ours")) for name in most}
+    minus = {name: pl.when(one == other).then(0.0).otherwise(one - other) for name, (one, other) in pairs.items()}
     compared = both.select("id", **minus)
     # What equals a tolerance is not beyond it, whatever its last bits.
     beyond = [pl.when(pl.col(name).abs().round(4) > by).then(pl.lit(name)) for name, by in most.items()]
