@@ -334,12 +334,6 @@ impl LanePlan {
         block.first_lane + key.unit * self.lanes_per_unit(block) + inner as u64
     }
 
-    /// Position of a lane's model in the plan: the innermost part of the lane index, because every block holds whole
-    /// units.
-    pub fn model_of(&self, lane: u64) -> usize {
-        (lane % self.models.len() as u64) as usize
-    }
-
     /// Key of a lane index; `None` if out of range.
     pub fn key(&self, lane: u64) -> Option<LaneKey> {
         if lane >= self.lane_count() {
