@@ -16,7 +16,7 @@ use crate::model::driver::ModelId;
 use crate::run::score::{
     Best, CategoryScores, Misfit, ScoreCell, ScoreTable, f1, published_failures, published_lvd_f1,
 };
-use crate::run::study::{CategoryNumbers, ReferenceComparison, Study, StudyEvaluation, StudyProvenance};
+use crate::run::study::{ReferenceComparison, Study, StudyEvaluation, StudyProvenance};
 use crate::scenario::Category;
 use crate::scenario::parameterization::Parameterization;
 use crate::support::run_folder::{ResultFiles, Results};
@@ -65,17 +65,13 @@ impl<'a> StudyReport<'a> {
         self.study.plan().lane_count()
     }
 
-    /// The scores of each category, and its other numbers.
-    fn scored(&self) -> impl Iterator<Item = (&CategoryScores, &CategoryNumbers)> {
-        self.evaluation.scores.categories.iter().zip(&self.evaluation.categories)
-    }
-
     /// Error of the motions beside the mean F1 of every variant; `None` unless S' are given as series or cross-validated.
     pub(super) fn given_table(&self) -> Option<Table> {
-        let rows = self.scored().flat_map(|(scores, pictures)| {
-            let variants = pictures.rmse.iter().enumerate().skip(1);
-            variants.map(move |(variant, rmse)| (scores, variant, *rmse))
-        });
+        let rows =
+            self.evaluation.scores.categories.iter().zip(&self.facts().categories).flat_map(|(scores, facts)| {
+                let variants = facts.rmse.iter().enumerate().skip(1);
+                variants.map(move |(variant, rmse)| (scores, variant, *rmse))
+            });
         let rows: Vec<(&CategoryScores, usize, f64)> = rows.collect();
         let three = |name: String| Column::from(name).digits(Digits::Fixed(3)).null("-");
         let table = Table::of(rows.iter())
@@ -126,8 +122,8 @@ impl<'a> StudyReport<'a> {
         if let Some(given) = self.given_table() {
             results.add("variants.csv", given.csv().as_bytes())?;
         }
-        if self.evaluation.categories.iter().any(|of| !of.folds.is_empty()) {
-            let folds = self.evaluation.categories.iter().flat_map(|of| &of.folds);
+        if self.facts().categories.iter().any(|of| !of.folds.is_empty()) {
+            let folds = self.facts().categories.iter().flat_map(|of| &of.folds);
             let table = Table::of(folds).column("scenario", |(id, _)| id.as_str()).column("fold", |(_, fold)| *fold);
             results.add("folds.csv", table.build().csv().as_bytes())?;
         }
@@ -147,23 +143,25 @@ impl<'a> StudyReport<'a> {
             figures.push(("radar", radar(scores, data)));
             figures.push(("recall-precision", recall_and_precision(scores, confidence, data)));
         }
-        let Some(pictures) = self.evaluation.categories.get(at) else { return figures };
+        let numbers = &self.evaluation.categories[at];
+        let Some(facts) = self.facts().categories.get(at) else { return figures };
         if scores.variants.len() > 1 {
-            figures.push(("f1-by-parameters", f1_by_parameters(scores, &pictures.means, confidence, data)));
+            figures.push(("f1-by-parameters", f1_by_parameters(scores, &numbers.means, confidence, data)));
         }
-        figures.extend(headways(&pictures.headways, scores, confidence, data).map(|figure| ("headways", figure)));
-        if !pictures.parameters.is_empty() {
-            figures.push(("parameters", distributions(scores.category, &pictures.parameters, data)));
+        figures.extend(headways(&numbers.headways, scores, confidence, data).map(|figure| ("headways", figure)));
+        if !facts.parameters.is_empty() {
+            figures.push(("parameters", distributions(scores.category, &facts.parameters, data)));
         }
-        if !pictures.modes.is_empty() {
-            figures.push(("modes", modes(scores.category, &pictures.modes, &pictures.svd_explained, data)));
+        if !facts.modes.is_empty() {
+            figures.push(("modes", modes(scores.category, &facts.modes, &facts.svd_explained, data)));
         }
         figures
     }
 
     /// Failures of every variant by headway.
     fn headways(&self, data: &str) -> Table {
-        let rows = self.scored().flat_map(|(scores, pictures)| pictures.headways.rows().map(move |row| (scores, row)));
+        let categories = self.evaluation.scores.categories.iter().zip(&self.evaluation.categories);
+        let rows = categories.flat_map(|(scores, numbers)| numbers.headways.rows().map(move |row| (scores, row)));
         Table::of(rows)
             .column("category", |(scores, _)| scores.category.key())
             .column("variant", |(_, (variant, ..))| variant)
