@@ -4,7 +4,7 @@
 //! Kinds differ in lightness, from white to nearly black, so that colour-blind readers and grey prints can distinguish
 //! them.
 
-use super::plot::{Cells, Figure, Fill, FilledCell, Height, INK, Plot, PlotAxis, Rule};
+use super::plot::{Cells, Figure, FilledCell, Height, INK, Plot, PlotAxis, Rule};
 use crate::run::check::Answer;
 use crate::run::grid::{CellOutcome, Grid, boundary, runs};
 
@@ -102,7 +102,7 @@ impl MapSheet<'_> {
             for j in 0..self.grid.y().len() {
                 for (from, to) in runs(self.grid.x().len(), &|i| kind(i, j) == *outcome as usize) {
                     let corners = [(across[from], up[j]), (across[to], up[j + 1])];
-                    cells.cells.push(FilledCell { corners, fill: flat(colour(*outcome)), ..FilledCell::default() });
+                    cells.cells.push(FilledCell { corners, colour: colour(*outcome), tip: "" });
                 }
             }
         }
@@ -138,11 +138,11 @@ impl MapSheet<'_> {
     }
 
     /// The outcomes that occur, with their counts.
-    fn key(&self) -> Vec<(String, Fill)> {
+    fn key(&self) -> Vec<(String, &'static str)> {
         let named = |outcome: &CellOutcome| {
             let count = self.cells.iter().filter(|of| *of == outcome).count();
             let name = outcome.label();
-            (count > 0).then(|| (format!("{name}: {count} of {}", self.cells.len()), flat(colour(*outcome))))
+            (count > 0).then(|| (format!("{name}: {count} of {}", self.cells.len()), colour(*outcome)))
         };
         self.outcomes.iter().filter_map(named).collect()
     }
@@ -161,10 +161,6 @@ impl MapSheet<'_> {
         let values = self.grid.panels()[panel].iter().enumerate().skip(first);
         values.map(|(at, value)| self.value_name(at, *value)).collect::<Vec<_>>().join(", ")
     }
-}
-
-fn flat(colour: &str) -> Fill {
-    Fill { colour: colour.to_owned(), ..Fill::default() }
 }
 
 #[cfg(test)]

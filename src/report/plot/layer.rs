@@ -337,24 +337,15 @@ impl Series {
 /// Overlap of neighbouring rows of cells, to avoid white seams.
 const SEAM_PX: f64 = 0.6;
 
-/// Look of a cell.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Fill {
-    /// `#rrggbb`.
-    pub colour: String,
-    /// 0 to 1; `None` is 1.
-    pub opacity: Option<f64>,
-}
-
 /// A rectangle.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FilledCell {
     /// Two opposite corners.
     pub corners: [(f64, f64); 2],
-    /// Its look.
-    pub fill: Fill,
-    /// Tooltip in a browser.
-    pub tip: String,
+    /// `#rrggbb`.
+    pub colour: &'static str,
+    /// Tooltip in a browser; empty: none.
+    pub tip: &'static str,
 }
 
 /// Rectangles behind everything else.
@@ -362,21 +353,18 @@ pub struct FilledCell {
 pub struct Cells {
     /// The rectangles.
     pub cells: Vec<FilledCell>,
-    /// Legend: names and their looks.
-    pub key: Vec<(String, Fill)>,
+    /// Legend: names and their colours.
+    pub key: Vec<(String, &'static str)>,
 }
 
-impl Fill {
-    fn draw(&self, canvas: &mut Canvas, (x1, y1): Position, (x2, y2): Position) {
-        let paint = Paint { opacity: self.opacity, ..Paint::fill(&self.colour) };
-        canvas.rect((x1, y1.min(y2)), (x2, y1.max(y2) + SEAM_PX), paint);
-    }
+fn fill(canvas: &mut Canvas, colour: &str, (x1, y1): Position, (x2, y2): Position) {
+    canvas.rect((x1, y1.min(y2)), (x2, y1.max(y2) + SEAM_PX), Paint::fill(colour));
+}
 
-    /// Draws a sample for the legend.
-    pub(super) fn sample(&self, canvas: &mut Canvas, from: Position, to: Position) {
-        self.draw(canvas, from, to);
-        canvas.rect(from, to, Paint::line(GRID, 0.8));
-    }
+/// Draws a sample of a colour for the legend.
+pub(super) fn fill_sample(canvas: &mut Canvas, colour: &str, from: Position, to: Position) {
+    fill(canvas, colour, from, to);
+    canvas.rect(from, to, Paint::line(GRID, 0.8));
 }
 
 impl Cells {
@@ -385,9 +373,9 @@ impl Cells {
         canvas.group("shape-rendering=\"crispEdges\"", "", |canvas| {
             for cell in &self.cells {
                 let (from, to) = (axes.at(cell.corners[0]), axes.at(cell.corners[1]));
-                match cell.tip.as_str() {
-                    "" => cell.fill.draw(canvas, from, to),
-                    tip => canvas.group("class=\"cell\"", tip, |canvas| cell.fill.draw(canvas, from, to)),
+                match cell.tip {
+                    "" => fill(canvas, cell.colour, from, to),
+                    tip => canvas.group("class=\"cell\"", tip, |canvas| fill(canvas, cell.colour, from, to)),
                 }
             }
         });

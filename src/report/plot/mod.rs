@@ -13,11 +13,11 @@ mod svg;
 use std::f64::consts::TAU;
 
 pub(super) use axis::AxisScale;
-pub(super) use layer::{Cells, Fill, FilledCell, Mark, Rule, Series, Value};
+pub(super) use layer::{Cells, FilledCell, Mark, Rule, Series, Value};
 pub(super) use look::{Look, Symbol};
 
 pub(super) use axis::{logarithmic_reach, number, plain_end, quantity};
-use layer::HOLLOW;
+use layer::{HOLLOW, fill_sample};
 pub(super) use layer::{TICK, is_few};
 #[cfg(test)]
 pub(super) use svg::tests::words;
@@ -349,7 +349,7 @@ impl Figure {
             Some((name, Entry::Series(series, self.look(series))))
         });
         let fills = self.plots.iter().flat_map(|plot| &plot.cells).flat_map(|cells| &cells.key);
-        let fills = fills.map(|(name, fill)| (name.as_str(), Entry::Fill(fill)));
+        let fills = fills.map(|(name, colour)| (name.as_str(), Entry::Fill(colour)));
         let rules = self.plots.iter().flat_map(|plot| &plot.rules).filter(|rule| !rule.name.is_empty());
         let rules = rules.map(|rule| (rule.name.as_str(), Entry::Rule(rule)));
         let mut entries: Vec<(&str, Entry)> = series.collect();
@@ -370,7 +370,9 @@ impl Figure {
                 canvas.group("class=\"legend\"", "", |canvas| match entry {
                     Entry::Series(series, look) => series.sample(canvas, (x, middle), SAMPLE_PX, look),
                     Entry::Rule(rule) => rule.sample(canvas, (x, middle), SAMPLE_PX),
-                    Entry::Fill(fill) => fill.sample(canvas, (x + 10.0, middle - 7.0), (x + 28.0, middle + 7.0)),
+                    Entry::Fill(colour) => {
+                        fill_sample(canvas, colour, (x + 10.0, middle - 7.0), (x + 28.0, middle + 7.0));
+                    }
                 });
                 let below = canvas.paragraph((x + SAMPLE_TEXT_PX, y), name, TEXT, width_px);
                 y = below.max(y + TEXT.line_px()) + 2.0;
@@ -384,7 +386,7 @@ impl Figure {
 /// An entry of the legend.
 enum Entry<'a> {
     Series(&'a Series, Look),
-    Fill(&'a Fill),
+    Fill(&'static str),
     Rule(&'a Rule),
 }
 

@@ -5,7 +5,7 @@
 
 use super::{TraceFigure, thousandths};
 use crate::engine::{StepMark, Trace, TracedStep};
-use crate::report::plot::{Cells, Figure, Fill, FilledCell, GREY, Height, Plot, PlotAxis, Rule, number};
+use crate::report::plot::{Cells, Figure, FilledCell, GREY, Height, Plot, PlotAxis, Rule, number};
 
 /// Names and colours of the vehicles.
 const VEHICLES: [(&str, &str); 3] =
@@ -72,15 +72,11 @@ impl TraceFigure<'_> {
         let x = (x.0, x.1.min(VIEW_M));
         let cut = if is_cut { "What is farther than 120 m ahead is not shown. " } else { "" };
         let plot = |(heading, vehicles): Row| {
-            let cell = |(corners, (name, colour)): (Option<Corners>, &(&str, &str))| {
-                Some(FilledCell {
-                    corners: corners?,
-                    fill: Fill { colour: (*colour).to_owned(), ..Fill::default() },
-                    tip: (*name).to_owned(),
-                })
+            let cell = |(corners, (tip, colour)): (Option<Corners>, (&'static str, &'static str))| {
+                Some(FilledCell { corners: corners?, colour, tip })
             };
-            let cells: Vec<FilledCell> = vehicles.into_iter().zip(&VEHICLES).filter_map(cell).collect();
-            let key = cells.iter().map(|cell| (cell.tip.clone(), cell.fill.clone())).collect();
+            let cells: Vec<FilledCell> = vehicles.into_iter().zip(VEHICLES).filter_map(cell).collect();
+            let key = cells.iter().map(|cell| (cell.tip.to_owned(), cell.colour)).collect();
             let lane = [-half_lane_m, half_lane_m].map(|edge| vec![(x.0, edge), (x.1, edge)]).to_vec();
             let edges = Rule { runs: lane, colour: GREY, width_px: 1.0, dash: "14,6", ..Rule::default() };
             Plot {
