@@ -8,7 +8,6 @@ mod traced;
 
 use std::path::Path;
 
-pub use record::SampleRecord;
 pub use traced::{TracedCase, TracedLane, TracedLanes};
 
 use crate::engine::{Headway, LaneKey, LanePlan};
@@ -55,7 +54,7 @@ impl Reopened {
             return Ok(Reopened::study(record::study_of(dir)?));
         }
         if has(ESTIMATE_RECORD) {
-            let (plan, density) = SampleRecord::read(dir)?.plan(dir)?;
+            let (plan, density) = record::sample_of(dir)?;
             return Ok(Reopened::sample(plan, density));
         }
         let plan = dir.join(PLAN_FILE);

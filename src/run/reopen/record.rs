@@ -16,93 +16,65 @@ use crate::support::input_file::{MAX_TABLE_BYTES, read_json};
 use crate::support::run_folder::{ESTIMATE_RECORD, STUDY_RECORD};
 use crate::{Error, Place, Result};
 
-/// Fields read from `estimate.json` of a sampling run.
-#[derive(Debug, Clone, Deserialize)]
-pub struct SampleRecord {
-    lanesweep_estimate: u64,
-    /// Files of earlier versions have no engine number.
-    engine: Option<u64>,
-    estimator: String,
-    points: String,
-    #[serde(default)]
-    given: Vec<(String, f64)>,
-    /// Requested number of samples.
-    pub samples: u64,
-    /// Seed of the draws.
-    pub seed: u64,
-    /// Driver models.
-    pub models: Vec<ModelId>,
-    /// Headways of the plan.
-    pub plan_headways: Vec<Headway>,
-    /// Profile, with its time step.
-    pub profile: Profile,
-    /// Hash of the plan of crude Monte Carlo.
-    pub plan_sha256: Option<String>,
-}
-
-impl SampleRecord {
-    /// Reads the record of a folder.
-    ///
-    /// # Errors
-    /// [`Error::Io`]; [`Error::Input`] if the folder does not hold a run of this version and engine.
-    pub(crate) fn read(dir: &Path) -> Result<SampleRecord> {
-        let path = dir.join(ESTIMATE_RECORD);
-        let wrong = |problem: String| {
-            let help = "give the folder (option `out`) of a `lanesweep sample` run by this version";
-            Error::input(Place::file(&path), problem, help)
-        };
-        let text =
-            read_json(&path, MAX_TABLE_BYTES, "the record of a run", "run `lanesweep sample` into this folder again")?;
-        let run: SampleRecord =
-            serde_json::from_slice(&text).map_err(|e| wrong(format!("it is not the record of a run: {e}")))?;
-        if run.lanesweep_estimate != 1 {
-            return Err(wrong(format!("its version is {}, this program reads 1", run.lanesweep_estimate)));
-        }
-        check_engine(run.engine).map_err(wrong)?;
-        if !["mc", "is"].contains(&&*run.estimator) {
-            return Err(wrong(format!("estimator `{}` is not known", run.estimator)));
-        }
-        Ok(run)
+/// Crude Monte Carlo of a folder: the plan, remade from the density beside the record, and the density.
+pub(super) fn sample_of(dir: &Path) -> Result<(LanePlan, DensityModel)> {
+    #[derive(Deserialize)]
+    struct Recorded {
+        lanesweep_estimate: u64,
+        /// Files of earlier versions have no engine number.
+        engine: Option<u64>,
+        estimator: String,
+        points: String,
+        #[serde(default)]
+        given: Vec<(String, f64)>,
+        samples: u64,
+        seed: u64,
+        models: Vec<ModelId>,
+        plan_headways: Vec<Headway>,
+        profile: Profile,
+        plan_sha256: Option<String>,
     }
-
-    /// The plan of crude Monte Carlo, remade from the density in the same folder.
-    ///
-    /// # Errors
-    /// [`Error::Io`]; [`Error::Input`] if the folder does not hold a complete and unchanged run of crude Monte Carlo.
-    pub(super) fn plan(&self, dir: &Path) -> Result<(LanePlan, DensityModel)> {
-        let path = dir.join("density.json");
-        let again = "run `lanesweep sample` into this folder again: it writes the density that it samples";
-        let density = read_density(&path).map_err(|error| match error {
-            Error::Input { place, problem, .. } => Error::input(*place, problem, again),
-            Error::Io { source, .. } if source.kind() == ErrorKind::NotFound => {
-                Error::input(Place::file(&path), "the density of the run is missing", again)
-            }
-            other => other,
-        })?;
-        let wrong = |problem: String| {
-            let help =
-                "give the folder (option `out`) of a `lanesweep sample` run of crude Monte Carlo by this version";
-            Error::input(Place::file(dir.join(ESTIMATE_RECORD)), problem, help)
-        };
-        if self.estimator != "mc" {
-            return Err(wrong(format!("a run of estimator `{}` has no numbered lanes", self.estimator)));
-        }
-        let headways = match density.space.has_thw() {
-            true => SampleHeadways::Sampled,
-            false => SampleHeadways::Each(self.plan_headways.clone()),
-        };
-        let options = SampleOptions {
-            seed: self.seed,
-            source: if self.points == "sobol" { SampleSource::Sobol } else { SampleSource::Random },
-            models: self.models.clone(),
-            ..SampleOptions::new(Estimator::CRUDE, self.samples, headways)
-        };
-        let plan = plan_samples(&density, &mixture_of(&density, &self.given)?, &self.profile, &options)?;
-        if self.plan_sha256.as_deref() != Some(plan.hash()) {
-            return Err(wrong("its plan does not match the density and the profile beside it".to_owned()));
-        }
-        Ok((plan, density))
+    let (path, density_path) = (&dir.join(ESTIMATE_RECORD), &dir.join("density.json"));
+    let wrong = |problem: String| {
+        let help = "give the folder (option `out`) of a `lanesweep sample` run of crude Monte Carlo by this version";
+        Error::input(Place::file(path), problem, help)
+    };
+    let text =
+        read_json(path, MAX_TABLE_BYTES, "the record of a run", "run `lanesweep sample` into this folder again")?;
+    let run: Recorded =
+        serde_json::from_slice(&text).map_err(|e| wrong(format!("it is not the record of a run: {e}")))?;
+    if run.lanesweep_estimate != 1 {
+        return Err(wrong(format!("its version is {}, this program reads 1", run.lanesweep_estimate)));
     }
+    check_engine(run.engine).map_err(wrong)?;
+    match &*run.estimator {
+        "mc" => {}
+        "is" => return Err(wrong("a run of estimator `is` has no numbered lanes".to_owned())),
+        other => return Err(wrong(format!("estimator `{other}` is not known"))),
+    }
+    let again = "run `lanesweep sample` into this folder again: it writes the density that it samples";
+    let density = read_density(density_path).map_err(|error| match error {
+        Error::Input { place, problem, .. } => Error::input(*place, problem, again),
+        Error::Io { source, .. } if source.kind() == ErrorKind::NotFound => {
+            Error::input(Place::file(density_path), "the density of the run is missing", again)
+        }
+        other => other,
+    })?;
+    let headways = match density.space.has_thw() {
+        true => SampleHeadways::Sampled,
+        false => SampleHeadways::Each(run.plan_headways),
+    };
+    let options = SampleOptions {
+        seed: run.seed,
+        source: if run.points == "sobol" { SampleSource::Sobol } else { SampleSource::Random },
+        models: run.models,
+        ..SampleOptions::new(Estimator::CRUDE, run.samples, headways)
+    };
+    let plan = plan_samples(&density, &mixture_of(&density, &run.given)?, &run.profile, &options)?;
+    if run.plan_sha256.as_deref() != Some(plan.hash()) {
+        return Err(wrong("its plan does not match the density and the profile beside it".to_owned()));
+    }
+    Ok((plan, density))
 }
 
 /// Checks whether a record was made with this program's engine version.
