@@ -123,7 +123,6 @@ def tracks(
     paths: Paths,
     *,
     preset: Path | None = None,
-    write_preset: Path | None = None,
     convert: Path | None = None,
     out: Path | None = None,
     **options: Unpack[Run],
@@ -139,12 +138,10 @@ def tracks(
         Track files, or folders of them.
     preset : str or path
         Format: ``"exid"``, ``"sumo-fcd"``, … or a TOML file that says what the columns mean; by default it is detected.
-    write_preset : path
-        Write a first preset for a file that no preset fits.
     convert : path
         Write the tracks in highD's format into this folder, or as one table: .csv, .parquet, .jsonl.
     out : path, optional
-        Folder for tracks.json and figures. Without it those of a single path go with the result.
+        Folder for tracks.json and a figure of each recording. Without it those of a single path go with the result.
     **options
         `Run` of `lanesweep.options`.
 
@@ -152,7 +149,7 @@ def tracks(
     -------
     Result
     """
-    return run("tracks", locals(), default_out=None if _are_several(paths) or write_preset is not None else "tracks")
+    return run("tracks", locals(), default_out=None if _are_several(paths) else "tracks")
 
 
 def _are_several(paths: Paths) -> bool:

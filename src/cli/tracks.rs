@@ -4,21 +4,22 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use serde::Serialize;
 
 use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::format::FormatFlag;
 use super::{Exit, Output};
-use crate::report::tracks::{TrackReport, across, report_text, space_time};
-use crate::scenario::{ScenarioFile, usable};
-use crate::support::files::{check_folder, write_atomically};
+use crate::report::tracks::{TrackReport, across};
+use crate::scenario::usable;
+use crate::support::files::check_folder;
 use crate::support::plausibility::Implausible;
 use crate::support::run_folder::{RunFolder, unfinished};
 use crate::support::table::{Table, TableMetadata};
-use crate::traffic::mining::{CategoryCount, counts, mine, noise_notes};
+use crate::traffic::mining::{counts, mine, noise_notes};
 use crate::traffic::trajectory::highd::{self, HighdFiles, SYNTHETIC_MARKER};
-use crate::traffic::trajectory::tracks::{LoadedTracks, Preset, SYNTHETIC, Understanding, draft, read_tracks};
-use crate::traffic::trajectory::{InputFile, Inputs, NO_LANE, Recording, Track, VehicleClass};
+use crate::traffic::trajectory::tracks::{LoadedTracks, SYNTHETIC, Understanding, read_tracks};
+use crate::traffic::trajectory::{InputFile, Inputs, Loaded, NO_LANE, Recording, Track, VehicleClass};
 use crate::{Error, Place, Result};
 
 /// What is in a track file? Check it, draw it, convert it
@@ -28,8 +29,7 @@ use crate::{Error, Place, Result};
 /// that take recordings read the same files. A preset is a TOML file that says what the columns mean.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
-    lanesweep tracks fcd.csv\n  \
-    lanesweep tracks own.csv --write-preset own.toml\n  \
+    lanesweep tracks own.csv\n  \
     lanesweep tracks own.csv --preset own.toml --out figures --convert converted")]
 pub(super) struct Tracks {
     /// Track files, or folders of them
@@ -38,10 +38,7 @@ pub(super) struct Tracks {
     /// Format of the files: exid, sumo-fcd, … or a TOML file [default: detected]
     #[arg(long, value_name = "NAME|FILE", help_heading = "Data")]
     preset: Option<String>,
-    /// Write a first preset for a file that no preset fits
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["preset", "out", "convert"], help_heading = "Output")]
-    write_preset: Option<PathBuf>,
-    /// Folder for tracks.json and figures: positions over time and across the road
+    /// Folder for tracks.json and a figure of each recording: positions across the road
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     out: Option<PathBuf>,
     /// Write the tracks in highD's format into this folder, or as one table: .csv, .parquet
@@ -51,40 +48,27 @@ pub(super) struct Tracks {
     format: FormatFlag,
 }
 
-from_arguments!(Tracks { paths, preset, write_preset, out, convert } groups { format });
+from_arguments!(Tracks { paths, preset, out, convert } groups { format });
 
 impl Tracks {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
-        if let Some(path) = &self.write_preset {
-            return self.write_draft(path);
-        }
         if let Some(out) = &self.out {
             check_folder(out)?;
         }
-        let mut reports: Vec<TrackReport> = Vec::new();
-        let mut recordings: Vec<Recording> = Vec::new();
-        let mut is_complete = true;
+        let (mut reports, mut recordings, mut is_complete) = (Vec::new(), Vec::new(), true);
+        let is_kept = self.out.is_some() || self.convert.is_some();
         for path in &self.paths {
-            let inputs = Inputs::of(path, self.preset.as_deref())?;
-            let (files, problems) = inputs.files();
+            let (files, problems) = Inputs::of(path, self.preset.as_deref())?.files();
             is_complete &= problems.is_empty();
             problems.iter().for_each(super::console::complain);
             for file in files {
                 // A bad file does not hide what is in the others.
-                match self.of_file(&file, configured) {
-                    Ok(found) => {
-                        for (report, recording) in found {
-                            is_complete &= report.understanding.is_usable();
-                            reports.push(report);
-                            if self.out.is_some() || self.convert.is_some() {
-                                recordings.push(recording);
-                            }
-                        }
-                    }
-                    Err(error) => {
-                        is_complete = false;
-                        super::console::complain(&error);
-                    }
+                let found = self.of_file(&file, configured).inspect_err(super::console::complain);
+                is_complete &= found.is_ok();
+                for (report, recording) in found.into_iter().flatten() {
+                    is_complete &= report.understanding.is_usable();
+                    reports.push(report);
+                    recordings.extend(is_kept.then_some(recording));
                 }
             }
         }
@@ -97,94 +81,46 @@ impl Tracks {
         if let Some(to) = &self.convert {
             convert(to, &reports, &recordings)?;
         }
-        let json = || {
-            serde_json::to_string_pretty(&reports).map_err(|error| Error::Internal(format!("tracks as JSON: {error}")))
-        };
-        let text = || report_text(&reports);
+        let json = || json(&reports);
+        let text = || reports.iter().map(TrackReport::text).collect::<Vec<_>>().join("\n");
         self.format.output(if is_complete { Exit::Ok } else { Exit::Incomplete }, text, json)
     }
 
-    fn write_draft(&self, path: &Path) -> Result<Output> {
-        let [file] = &self.paths[..] else {
-            let problem = "one file is needed for a preset";
-            return Err(Error::usage(Place::item("--write-preset"), problem, "name one track file"));
-        };
-        if path.exists() {
-            let problem = "the file exists; it may hold your changes";
-            return Err(Error::usage(Place::file(path), problem, "choose another name, or remove it"));
-        }
-        let text = draft(file)?;
-        write_atomically(path, text.as_bytes())?;
-        tracing::info!(
-            "{} written: check each line, then run `tracks` with --preset {}",
-            path.display(),
-            path.display()
-        );
-        Ok(Exit::Ok.into())
-    }
-
     fn of_file(&self, file: &InputFile, configured: &Configured) -> Result<Vec<(TrackReport, Recording)>> {
-        // Found and kept scenarios, what noise may do to them, and those that runs leave out.
-        let mined_of = |recording: &Recording| -> (Vec<CategoryCount>, Vec<String>) {
-            let options = &configured.settings.mining;
-            let ScenarioFile { scenarios, problems, .. } =
-                usable(mine(recording, options).scenarios, Implausible::Refused);
-            let mut notes = noise_notes(recording, &scenarios, options);
-            if let Some(first) = problems.first() {
-                notes.push(format!("{} more scenarios are left out, the first: {first}", problems.len()));
-            }
-            (counts(&scenarios).to_vec(), notes)
+        let (name, preset, read) = match file {
+            InputFile::Highd(files) => (&files.tracks, "highd", vec![Understanding::of_loaded(highd::read(files)?)]),
+            InputFile::Tracks(file, preset) => (&file.path, preset.name.as_str(), read_tracks(file, preset)?),
         };
-        let is_detected = self.preset.is_none();
-        match file {
-            InputFile::Highd(files) => {
-                let loaded = highd::read(files)?;
-                let (mut understanding, recording) = Understanding::of_recording(loaded.recording, loaded.notes);
-                let (mined, notes) = mined_of(&recording);
-                understanding.note(notes);
-                let file = files.tracks.display().to_string();
-                let preset = "highd".to_owned();
-                let report =
-                    TrackReport { file, preset, is_detected, understanding, mined, mined_without_smoothing: None };
-                Ok(vec![(report, recording)])
+        let report = |LoadedTracks { loaded, mut understanding }| {
+            let (Loaded { recording, vehicle_names, .. }, options) = (loaded, &configured.settings.mining);
+            // As in runs: what noise may do to the scenarios, and those that are left out.
+            let mined = usable(mine(&recording, options).scenarios, Implausible::Refused);
+            if understanding.is_usable() {
+                noise_notes(&recording, options).into_iter().for_each(|note| understanding.warn(note));
+                if let Some(first) = mined.problems.first() {
+                    let number = mined.problems.len();
+                    understanding.warn(format!("{number} more scenarios are left out, the first: {first}"));
+                }
             }
-            InputFile::Tracks(file, preset) => {
-                let without = preset.smoothing_s.map(|_| Preset { smoothing_s: None, ..(**preset).clone() });
-                // Before the recordings are read that are kept.
-                let rough = |preset| -> Result<Vec<_>> {
-                    Ok(read_tracks(file, &preset)?.iter().map(|rough| mined_of(&rough.loaded.recording).0).collect())
-                };
-                let mut rough = without.map(rough).transpose()?.map(Vec::into_iter);
-                let found = read_tracks(file, preset)?.into_iter().map(|LoadedTracks { loaded, mut understanding }| {
-                    let rough = rough.as_mut().and_then(Iterator::next);
-                    let (mined, notes) = mined_of(&loaded.recording);
-                    understanding.note(notes);
-                    let report = TrackReport {
-                        file: file.path.display().to_string(),
-                        preset: preset.name.clone(),
-                        is_detected,
-                        understanding,
-                        mined,
-                        mined_without_smoothing: rough,
-                    };
-                    (report, loaded.recording)
-                });
-                Ok(found.collect())
-            }
-        }
+            let (file, preset, is_detected) = (name.display().to_string(), preset.to_owned(), self.preset.is_none());
+            let mined = counts(&mined.scenarios).to_vec();
+            (TrackReport { file, preset, is_detected, understanding, vehicle_names, mined }, recording)
+        };
+        Ok(read.into_iter().map(report).collect())
     }
+}
+
+fn json(record: &impl Serialize) -> Result<String> {
+    serde_json::to_string_pretty(record).map_err(|error| Error::Internal(format!("tracks as JSON: {error}")))
 }
 
 fn write_figures(out: &Path, reports: &[TrackReport], recordings: &[Recording]) -> Result<()> {
     let folder = RunFolder::open(out, "tracks.json")?;
     let mut results = folder.results()?;
     for recording in recordings {
-        results.add(&format!("{}-time.svg", recording.id), space_time(recording).svg().as_bytes())?;
         results.add(&format!("{}-lanes.svg", recording.id), across(recording).svg().as_bytes())?;
     }
-    let record =
-        serde_json::to_vec_pretty(reports).map_err(|error| Error::Internal(format!("tracks.json: {error}")))?;
-    results.publish(&record)?;
+    results.publish(json(&reports)?.as_bytes())?;
     tracing::info!("figures written to {}", out.display());
     Ok(())
 }
@@ -195,11 +131,8 @@ fn convert(to: &Path, reports: &[TrackReport], recordings: &[Recording]) -> Resu
         return convert_to_highd(to, reports, recordings);
     }
     if to.exists() {
-        return Err(Error::usage(
-            Place::file(to),
-            "it exists, and would be replaced",
-            "choose another name, or remove it",
-        ));
+        let problem = "it exists, and would be replaced";
+        return Err(Error::usage(Place::file(to), problem, "choose another name, or remove it"));
     }
     // In one plane: x along the forward carriageway, y to its left.
     let way = |recording: &Recording, track: &Track| {
@@ -261,29 +194,23 @@ fn convert_to_highd(to: &Path, reports: &[TrackReport], recordings: &[Recording]
         results.add(SYNTHETIC_MARKER, b"SYNTHETIC DATA: converted from generated recordings\n")?;
     }
     let converted = recordings.iter().zip(&names).zip(reports).map(|((recording, id), report)| {
-        serde_json::json!({"recording": id, "of": recording.id, "file": report.file, "vehicle_names": report.understanding.vehicle_names})
+        serde_json::json!({"recording": id, "of": recording.id, "file": report.file, "vehicle_names": report.vehicle_names})
     });
     let record = serde_json::json!({
         "program": format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
         "files": results.names(),
         "recordings": converted.collect::<Vec<_>>(),
     });
-    let record =
-        serde_json::to_vec_pretty(&record).map_err(|error| Error::Internal(format!("{CONVERTED}: {error}")))?;
-    results.publish(&record)?;
+    results.publish(json(&record)?.as_bytes())?;
     tracing::info!("{} recordings written to {}; {CONVERTED} has their former names", recordings.len(), to.display());
     Ok(())
 }
 
-/// Numbers as highD's recordings have them: those that recordings have already, once each, and free ones for the others.
+/// Numbers as highD's recordings have them: their own, if each has one, else new ones.
 fn names(recordings: &[Recording]) -> Vec<String> {
-    let number = |recording: &Recording| recording.id.parse::<u32>().ok();
-    let mut taken = BTreeSet::new();
-    let is_own: Vec<bool> = recordings.iter().map(|of| number(of).is_some_and(|number| taken.insert(number))).collect();
-    let mut free = (1..).filter(|number| !taken.contains(number));
-    let named = recordings.iter().zip(is_own).map(|(recording, is_own)| match is_own {
-        true => recording.id.clone(),
-        false => format!("{:02}", free.next().unwrap_or_default()),
-    });
-    named.collect()
+    let own: BTreeSet<u32> = recordings.iter().filter_map(|of| of.id.parse().ok()).collect();
+    match own.len() == recordings.len() {
+        true => recordings.iter().map(|of| of.id.clone()).collect(),
+        false => (1..=recordings.len()).map(|number| format!("{number:02}")).collect(),
+    }
 }

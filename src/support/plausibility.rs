@@ -96,7 +96,8 @@ impl Quantity {
         contains(self.limits().plausible, value)
     }
 
-    fn describe(self, value: f64) -> String {
+    /// A value that is not plausible, in words.
+    pub fn describe(self, value: f64) -> String {
         let of = self.limits();
         let ((min, max), words) = match contains(of.physical, value) {
             true => (of.plausible, "is not plausible"),

@@ -89,16 +89,14 @@ fn smaller(line: &str) -> String {
     words.join(" ")
 }
 
-/// Two lanes of vehicles in SUMO's format.
-fn fcd() -> String {
-    let mut text = String::from(
-        "timestep_time;vehicle_id;vehicle_x;vehicle_y;vehicle_angle;vehicle_type;vehicle_speed;vehicle_lane\n",
-    );
+/// Two lanes of vehicles.
+fn tracks() -> String {
+    let mut text = String::from("id;time;x;y;speed;length;width;lane\n");
     for vehicle in 0..8 {
         for step in 0..120 {
             let (time, lane) = (0.1 * f64::from(step), vehicle % 2);
             let (x, y) = (30.0 * f64::from(vehicle) + 25.0 * time, 1.75 + 3.5 * f64::from(lane));
-            text += &format!("{time:.2};v{vehicle};{x:.2};{y:.2};90;passenger;25.00;east_{lane}\n");
+            text += &format!("v{vehicle};{time:.2};{x:.2};{y:.2};25.00;5;1.8;east_{lane}\n");
         }
     }
     text
@@ -124,15 +122,10 @@ fn every_example_of_the_help_runs() {
             }
             let case = "category,ego_speed_mps,speed_mps,gap,lateral_speed\n";
             std::fs::write(dir.join("cases.csv"), format!("{case}cut-in,30,20,20,1\ncut-in,30,20,40,1\n")).unwrap();
-            std::fs::write(dir.join("fcd.csv"), fcd()).unwrap();
-            let own = fcd().replace("vehicle_", "").replace("timestep_", "");
-            std::fs::write(dir.join("own.csv"), own.replace("angle;", "").replace(";90;", ";")).unwrap();
+            std::fs::write(dir.join("own.csv"), tracks()).unwrap();
+            let generic = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/presets/generic.toml");
+            std::fs::copy(generic, dir.join("own.toml")).unwrap();
             std::fs::write(dir.join("study.toml"), "[score]\nmin_failures = 5\n").unwrap();
-            // A draft asks.
-            if let Ok(draft) = std::fs::read_to_string(dir.join("own.toml")) {
-                let answered = draft.replace("reference = \"?\"", "reference = \"front\"");
-                std::fs::write(dir.join("own.toml"), answered.replace("y = \"?\"", "y = \"left\"")).unwrap();
-            }
             let output = run(dir, &smaller(&example));
             // Without a GPU `verify` says so.
             let is_without_device = verb == "verify" && output.status.code() == Some(7);

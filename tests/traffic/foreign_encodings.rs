@@ -160,7 +160,7 @@ fn what_a_time_without_a_unit_is_taken_for_is_said() {
     let generic = Preset::load("generic").unwrap();
     let about =
         tracks::read_tracks(&TrackFile { path, id: "own".to_owned() }, &generic).unwrap().remove(0).understanding;
-    assert!(about.columns.contains(&("time", "t (ms since 1970)".to_owned())), "{:?}", about.columns);
+    assert!(crate::tracks::fact(&about, "columns").contains("time = t (ms since 1970)"), "{:?}", about.facts);
 }
 
 #[test]
@@ -184,13 +184,12 @@ fn positions_in_millimetres_are_read_by_a_preset() {
         in_mm.header[at] = name.to_owned();
     }
     fs::write(&path, in_mm.text()).unwrap();
-    let draft = tracks::draft(&path).unwrap();
-    assert!(draft.contains("x = { name = \"x_mm\", unit = \"mm\" }"), "{draft}");
-    fs::write(
-        &preset,
-        draft.replace("reference = \"?\"", "reference = \"centre\"").replace("y = \"?\"", "y = \"left\""),
-    )
-    .unwrap();
+    let sizes = "length = \"length\"\nwidth = \"width\"\nclass = \"class\"\nheading = \"heading\"\nx_speed = \"vx\"\ny_speed = \"vy\"";
+    let columns = "x = { name = \"x_mm\", unit = \"mm\" }\ny = { name = \"y_mm\", unit = \"mm\" }";
+    let own = format!(
+        "name = \"own\"\n[classes]\ntruck = [\"truck\"]\n[columns]\nvehicle = \"track_id\"\ntime = \"t\"\n{columns}\n{sizes}\n"
+    );
+    fs::write(&preset, own).unwrap();
     let preset = Preset::load(&preset.to_string_lossy()).unwrap();
     let found = tracks::read_usable(&TrackFile { path, id: "own".to_owned() }, &preset, Implausible::Refused).unwrap();
     let right = read("own.csv", table().text().as_bytes()).unwrap();
@@ -202,6 +201,7 @@ fn positions_in_millimetres_are_read_by_a_preset() {
 fn geographic_coordinates_are_named_as_such() {
     let mut table = table();
     for (column, name) in [("x", "longitude"), ("y", "Latitude")] {
+        table.map(column, |metres, _| metres / 111_000.0);
         let at = table.at(column);
         table.header[at] = name.to_owned();
     }
@@ -212,43 +212,12 @@ fn geographic_coordinates_are_named_as_such() {
     assert!(error.to_string().contains("longitudes and latitudes (`longitude`, `Latitude`)"), "{error}");
     assert!(error.help().unwrap().contains("project"), "{error:?}");
     // A preset cannot take degrees for metres.
-    let draft = tracks::draft(&path).unwrap().replace("reference = \"?\"", "reference = \"centre\"");
-    let own = draft.replace("\ny = \"?\"\n", "\ny = \"left\"\n").replace("x = \"?\"", "x = \"longitude\"");
     let preset = dir.path().join("own.toml");
-    fs::write(&preset, own.replace("y = \"?\"", "y = \"Latitude\"")).unwrap();
+    let columns = "vehicle = \"track_id\"\ntime = \"t\"\nx = \"longitude\"\ny = \"Latitude\"\n";
+    fs::write(&preset, format!("name = \"own\"\n[columns]\n{columns}")).unwrap();
     let preset = Preset::load(&preset.to_string_lossy()).unwrap();
-    let error = tracks::read_tracks(&TrackFile { path, id: "own".to_owned() }, &preset).unwrap_err().to_string();
-    assert!(error.contains("longitude or latitude"), "{error}");
-}
-
-#[test]
-fn an_older_commonroad_file_is_named_as_such() {
-    let older = r#"<commonRoad commonRoadVersion="2018b" timeStepSize="0.1"><obstacle id="1"><role>dynamic</role></obstacle></commonRoad>"#;
-    let error = read("scene.xml", older.as_bytes()).unwrap_err();
-    assert!(error.to_string().contains("CommonRoad 2018b") && error.help().unwrap().contains("2020a"), "{error:?}");
-}
-
-#[test]
-fn sumos_times_for_people_are_times() {
-    let fcd = |times: &dyn Fn(u32) -> String| {
-        let step = |k: u32| {
-            let x = 100.0 + 30.0 * f64::from(k) / 10.0;
-            let vehicle = |id: &str, x: f64, y: f64, lane: u32| {
-                format!(
-                    "<vehicle id=\"{id}\" x=\"{x:.2}\" y=\"{y:.2}\" angle=\"90.00\" type=\"car\" speed=\"30.00\" pos=\"{x:.2}\" lane=\"e_{lane}\" slope=\"0.00\"/>"
-                )
-            };
-            let cars = vehicle("a", x, -4.8, 0) + &vehicle("b", x + 40.0, -1.6, 1) + &vehicle("c", x - 50.0, -4.8, 0);
-            format!("<timestep time=\"{}\">{cars}</timestep>\n", times(k))
-        };
-        format!("<fcd-export>\n{}</fcd-export>\n", (0..150).map(step).collect::<String>())
-    };
-    let seconds = fcd(&|k| format!("{:.2}", 60.0 + f64::from(k) / 10.0));
-    let for_people = fcd(&|k| format!("0:00:{:02}:{:05.2}", 1 + k / 600, f64::from(k % 600) / 10.0));
-    let right = read("fcd.xml", seconds.as_bytes()).unwrap();
-    assert_eq!((right.frame_rate_hz, right.tracks.len()), (10.0, 3));
-    assert!(read("fcd.xml", for_people.as_bytes()).unwrap() == right);
-    assert!(read("fcd.xml.gz", &packed(&for_people)).unwrap() == right);
+    let read = tracks::read_usable(&TrackFile { path, id: "own".to_owned() }, &preset, Implausible::Refused);
+    assert!(read.is_err(), "{read:?}");
 }
 
 /// Without a preset that names another unit; every codec of the usual programs.

@@ -1,4 +1,4 @@
-//! What only some programs write: SUMO's types, persons and lane changes of one step, and NGSIM's periods in one table.
+//! What only some programs write: SUMO's front bumpers, persons and lane changes of one step, and NGSIM's periods in one table.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -7,7 +7,7 @@ use std::path::Path;
 use lanesweep::scenario::{Category, read_scenario_file, write_scenarios};
 use lanesweep::support::plausibility::Implausible;
 use lanesweep::traffic::mining::{Collection, MiningOptions, mine_folder, mine_inputs};
-use lanesweep::traffic::trajectory::{Inputs, Loaded, Recording, Track, VehicleClass};
+use lanesweep::traffic::trajectory::{Inputs, Loaded, Track, VehicleClass};
 
 const LANE_WIDTH_M: f64 = 3.5;
 const RATE_HZ: f64 = 10.0;
@@ -37,22 +37,21 @@ fn times(seconds: usize) -> impl Iterator<Item = f64> {
     (0..seconds * RATE_HZ as usize).map(|k| k as f64 / RATE_HZ)
 }
 
-fn fcd_xml(vehicles: &[Driven], change_s: f64) -> String {
-    let mut text = "<fcd-export>\n".to_owned();
+/// SUMO's table, with the sizes of the types: 4.3 × 1.8 m, and of a lorry 7.1 × 2.4 m.
+fn fcd(vehicles: &[Driven], change_s: f64) -> String {
+    let header = "timestep_time;vehicle_id;vehicle_x;vehicle_y;vehicle_angle;vehicle_type;vehicle_speed;vehicle_lane;\
+                  vehicle_length;vehicle_width";
+    // Tables of time steps have a row for a step without vehicles.
+    let mut text = format!("{header}\n0.00;;;;;;;;;\n");
     for time in times(14) {
-        let _ = writeln!(text, "<timestep time=\"{time:.2}\">");
         for vehicle in vehicles {
             let (name, kind, .., speed, _) = *vehicle;
             let (x, y, lane) = place(*vehicle, time, change_s);
-            let _ = writeln!(
-                text,
-                "<vehicle id=\"{name}\" x=\"{x:.2}\" y=\"{y:.2}\" angle=\"90.00\" type=\"{kind}\" speed=\"{speed:.2}\" \
-                 pos=\"{x:.2}\" lane=\"E0_{lane}\" slope=\"0.00\"/>"
-            );
+            let size = if kind == "lorry" { "7.1;2.4" } else { "4.3;1.8" };
+            let _ = writeln!(text, "{time:.2};{name};{x:.2};{y:.2};90.00;{kind};{speed:.2};E0_{lane};{size}");
         }
-        text += "</timestep>\n";
     }
-    text + "</fcd-export>\n"
+    text
 }
 
 fn load(path: &Path) -> lanesweep::Result<Vec<Loaded>> {
@@ -62,100 +61,49 @@ fn load(path: &Path) -> lanesweep::Result<Vec<Loaded>> {
     Ok(read?.into_iter().flatten().collect())
 }
 
-fn sizes(recording: &Recording) -> Vec<[f64; 2]> {
-    recording.tracks.iter().map(|track| [track.length_m, track.width_m]).collect()
-}
-
 fn gap_m(ego: &Track, lead: &Track) -> f64 {
     lead.s_m[0] - ego.s_m[0] - 0.5 * (ego.length_m + lead.length_m)
 }
 
 #[test]
-fn a_vehicle_type_without_a_size_has_that_of_its_class() {
+fn the_gap_behind_a_truck_of_sumo_is_measured_from_its_front_bumper() {
     let dir = tempfile::tempdir().unwrap();
-    let vehicles: Vec<Driven> = [("a", "P"), ("b", "L"), ("c", "S"), ("d", "N"), ("e", "D@mixed"), ("f", "W")]
-        .into_iter()
-        .enumerate()
-        .map(|(at, (name, kind))| (name, kind, at % 3, 60.0 + 43.0 * (at / 3 * 3 + at % 3) as f64, 30.0, None))
-        .collect();
-    fs::write(dir.path().join("fcd.xml"), fcd_xml(&vehicles, 4.0)).unwrap();
-    let types = "<vType id=\"P\" vClass=\"passenger\"/><vType id=\"L\" vClass=\"truck\"/><vType id=\"S\" vClass=\"trailer\"/>\
-                 <vType id=\"N\" guiShape=\"bus\"/><vType id=\"W\" vClass=\"coach\" width=\"2.4\"/>\
-                 <vTypeDistribution id=\"mixed\"><vType id=\"D\" vClass=\"delivery\"/></vTypeDistribution>";
-    // Types may stand in a route file or in an additional one.
-    for (root, name) in [("routes", "demo.rou.xml"), ("additional", "types.add.xml"), ("routes", "fcd.trips.xml")] {
-        let file = dir.path().join(name);
-        fs::write(&file, format!("<{root}>{types}</{root}>")).unwrap();
-        let loaded = load(dir.path()).unwrap().remove(0);
-        let expected = [[5.0, 1.8], [7.1, 2.4], [16.5, 2.55], [5.0, 1.8], [6.5, 2.16], [14.0, 2.4]];
-        assert_eq!(sizes(&loaded.recording), expected, "{name}");
-        assert!(!loaded.notes.iter().any(|note| note.contains("size")), "{name}: {:?}", loaded.notes);
-        assert!(loaded.checksum_sha256.iter().any(|of| of.file == name));
-        fs::remove_file(file).unwrap();
-    }
-    // Without the file, the sizes are assumed, and the note names the types.
-    let loaded = load(dir.path()).unwrap().remove(0);
-    assert!(loaded.notes.iter().any(|note| note.contains("`S`") && note.contains("*.add.xml")), "{:?}", loaded.notes);
-}
-
-#[test]
-fn the_gap_behind_a_truck_of_sumo_is_measured_from_its_documented_length() {
-    let dir = tempfile::tempdir().unwrap();
-    let vehicles: [Driven; 2] = [("t", "L", 0, 143.0, 24.0, None), ("c", "P", 0, 100.0, 24.0, None)];
-    fs::write(dir.path().join("fcd.xml"), fcd_xml(&vehicles, 4.0)).unwrap();
-    let types = "<routes><vType id=\"P\"/><vType id=\"L\" vClass=\"truck\"/></routes>";
-    fs::write(dir.path().join("demo.rou.xml"), types).unwrap();
-    let recording = load(dir.path()).unwrap().remove(0).recording;
+    let path = dir.path().join("fcd.csv");
+    let vehicles: [Driven; 2] = [("t", "lorry", 0, 143.0, 24.0, None), ("c", "car", 0, 100.0, 24.0, None)];
+    fs::write(&path, fcd(&vehicles, 4.0)).unwrap();
+    let recording = load(&path).unwrap().remove(0).recording;
     let [truck, car] = &recording.tracks[..] else { panic!("{:?}", recording.tracks.len()) };
     assert_eq!(truck.class, VehicleClass::Truck);
     assert!((gap_m(car, truck) - 35.9).abs() < 1e-9, "{}", gap_m(car, truck));
 }
 
 #[test]
-fn two_sizes_of_one_type_are_refused_unless_a_file_is_named_like_the_tracks() {
+fn sumos_table_without_sizes_is_refused_with_what_makes_them() {
     let dir = tempfile::tempdir().unwrap();
-    let write = |name: &str, text: &str| fs::write(dir.path().join(name), text).unwrap();
-    write("run1.fcd.xml", &fcd_xml(&CUT_IN, 4.0));
-    let types = |length: &str| {
-        format!("<routes><vType id=\"car\" length=\"{length}\"/><vType id=\"lorry\" vClass=\"truck\"/></routes>")
-    };
-    write("a.rou.xml", &types("4.2"));
-    write("b.rou.xml", &types("4.2"));
-    assert_eq!(sizes(&load(dir.path()).unwrap()[0].recording)[0], [4.2, 1.8]);
-    write("b.rou.xml", &types("4.9"));
-    let error = load(dir.path()).unwrap_err();
-    assert!(error.to_string().contains("`car`") && error.to_string().contains("a.rou.xml and b.rou.xml"), "{error}");
-    write("run1.rou.xml", &types("4.6"));
-    assert_eq!(sizes(&load(dir.path()).unwrap()[0].recording)[0], [4.6, 1.8]);
+    let path = dir.path().join("fcd.csv");
+    let with = fcd(&CUT_IN, 4.0);
+    let without: String = with.lines().map(|line| line.rsplitn(3, ';').last().unwrap().to_owned() + "\n").collect();
+    fs::write(&path, without).unwrap();
+    let error = load(&path).unwrap_err();
+    assert!(error.to_string().contains("sumo-fcd takes `length` from the column `vehicle_length`"), "{error}");
+    assert!(error.help().unwrap().contains("from lanesweep.tracks import sumo"), "{error:?}");
+    // So is one in which some vehicles have none.
+    let some = |line: &str| if line.contains(";f.2;") { line.replace("4.3;1.8", ";") } else { line.to_owned() };
+    fs::write(&path, with.lines().map(some).collect::<Vec<_>>().join("\n")).unwrap();
+    let error = load(&path).unwrap_err();
+    assert!(error.to_string().contains("1 vehicles have no size"), "{error}");
 }
 
 #[test]
 fn persons_and_steps_without_vehicles_are_no_vehicles() {
     let dir = tempfile::tempdir().unwrap();
-    let mut text =
-        "timestep_time;vehicle_id;vehicle_x;vehicle_y;vehicle_angle;vehicle_type;vehicle_speed;vehicle_lane\n\
-                    0.00;;;;;;;\n"
-            .to_owned();
-    for time in times(12) {
-        for vehicle in CUT_IN {
-            let (x, y, lane) = place(vehicle, time, 4.0);
-            let _ =
-                writeln!(text, "{time:.2};{};{x:.2};{y:.2};90.00;{};{:.2};E0_{lane}", vehicle.0, vehicle.1, vehicle.4);
-        }
-        let x = 1.3 * time;
-        let _ = writeln!(text, "{time:.2};p0;{x:.2};-2.88;90.00;DEFAULT_PEDTYPE;1.30;");
-        let _ = writeln!(text, "{time:.2};p1;{x:.2};-3.88;90.00;walker;1.30;");
-    }
     let path = dir.path().join("fcd.csv");
+    let mut text = fcd(&CUT_IN, 4.0);
+    for time in times(12) {
+        let _ = writeln!(text, "{time:.2};p0;{:.2};-2.88;90.00;DEFAULT_PEDTYPE;1.30;;;", 1.3 * time);
+    }
     fs::write(&path, &text).unwrap();
-    let loaded = load(&path).unwrap().remove(0);
-    assert_eq!(loaded.recording.tracks.len(), CUT_IN.len());
-    assert!(loaded.notes.iter().any(|note| note.starts_with("1 are left out as persons")), "{:?}", loaded.notes);
-    // In XML they are elements of their own.
-    let person = "<person id=\"p0\" x=\"0.00\" y=\"-2.88\" angle=\"90.00\" speed=\"1.30\" pos=\"0.00\" edge=\"W0\"/>";
-    let xml = dir.path().join("fcd.xml");
-    fs::write(&xml, fcd_xml(&CUT_IN, 4.0).replace("</timestep>", &format!("{person}</timestep>"))).unwrap();
-    assert_eq!(load(&xml).unwrap()[0].recording.tracks.len(), CUT_IN.len());
+    assert_eq!(load(&path).unwrap()[0].recording.tracks.len(), CUT_IN.len());
     // A vehicle without a name is no empty step.
     fs::write(&path, text.replacen("f.1;", ";", 1)).unwrap();
     assert!(load(&path).unwrap_err().to_string().contains("there is no value"));
@@ -164,20 +112,16 @@ fn persons_and_steps_without_vehicles_are_no_vehicles() {
 #[test]
 fn a_lane_change_of_one_step_is_refused_from_recordings_and_from_files_alike() {
     let dir = tempfile::tempdir().unwrap();
-    let types = "<routes><vType id=\"car\"/><vType id=\"lorry\" vClass=\"truck\"/></routes>";
-    fs::write(dir.path().join("demo.rou.xml"), types).unwrap();
     let mined = |change_s: f64, implausible| -> Collection {
-        fs::write(dir.path().join("fcd.xml"), fcd_xml(&CUT_IN, change_s)).unwrap();
+        fs::write(dir.path().join("fcd.csv"), fcd(&CUT_IN, change_s)).unwrap();
         mine_folder(dir.path(), &MiningOptions::default(), implausible, || Ok(())).unwrap()
     };
     let cut_ins = |of: &Collection| of.scenarios.iter().filter(|s| s.category == Category::CutIn).count();
     let slow = mined(4.0, Implausible::Refused);
     assert_eq!((cut_ins(&slow), slow.problems.len()), (1, 0), "{:?}", slow.problems);
-    assert!(!slow.notes.iter().any(|note| note.contains("one step")), "{:?}", slow.notes);
     let instant = mined(0.05, Implausible::Refused);
     assert_eq!((cut_ins(&instant), instant.problems.len()), (0, 1), "{:?}", instant.notes);
     assert!(instant.problems[0].to_string().contains("lateral jump"), "{:?}", instant.problems);
-    assert!(instant.notes.iter().any(|note| note.contains("`lanechange.duration`")), "{:?}", instant.notes);
     // The file of the same scenario is refused for the same reason.
     let accepted = mined(0.05, Implausible::Accepted);
     assert_eq!(cut_ins(&accepted), 1);

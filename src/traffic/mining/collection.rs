@@ -190,7 +190,7 @@ pub fn mine_inputs(
     let (files, problems) = inputs.files();
     let part = |loaded: Loaded| {
         let mut mined = mine(&loaded.recording, options);
-        let of_noise = noise_notes(&loaded.recording, &mined.scenarios, options);
+        let of_noise = noise_notes(&loaded.recording, options);
         mined.scenarios.iter_mut().for_each(|scenario| name_as_in_file(scenario, &loaded));
         let ScenarioFile { scenarios, problems, notes: doubts } = usable(mined.scenarios, implausible);
         mined.scenarios = scenarios;

@@ -62,7 +62,6 @@ pub(super) struct CsvTable {
     line: u64,
     /// Line on which the last record ended.
     last_line: u64,
-    rows: u64,
     decimal_commas: bool,
     is_plain: bool,
 }
@@ -106,7 +105,6 @@ impl CsvTable {
             record: ByteRecord::new(),
             line: 0,
             last_line: 0,
-            rows: 0,
             decimal_commas,
             is_plain: input_file::is_plain(path)?,
         };
@@ -130,7 +128,6 @@ impl CsvTable {
         if !self.read_line()? {
             return Ok(false);
         }
-        self.rows += 1;
         if self.record.len() != self.header.len() {
             return Err(self.wrong_field_count());
         }
@@ -140,11 +137,6 @@ impl CsvTable {
     /// The column names.
     pub(super) fn header(&self) -> &[String] {
         &self.header
-    }
-
-    /// Number of data lines so far.
-    pub(super) fn rows(&self) -> u64 {
-        self.rows
     }
 
     /// Whether numbers have commas in place of points.

@@ -70,7 +70,7 @@ impl Inputs {
     /// Leaves out files of a folder that are no tracks. Names those that could be tracks: files of another preset, compressed
     /// files, and files that do not fit or cannot be opened although they have the ending of those that are read.
     fn with_others(mut self, folder: &Path) -> Result<Inputs> {
-        let own = self.preset().map(|preset| (preset.name.clone(), preset.format));
+        let own = self.preset().map(|preset| preset.name.clone());
         let mut endings: Vec<String> = own.is_none().then(|| "csv".to_owned()).into_iter().collect();
         let mut foreign = Vec::new();
         for file in files_of(folder)? {
@@ -79,29 +79,20 @@ impl Inputs {
                 let help = "unpack it, or compress text with gzip (.gz), which is read";
                 self.problems.push(Error::input(Place::file(&file), "it may hold tracks, and is compressed", help));
             }
-            if tracks::is_second(&file) && tracks::may_hold_tracks(&file) {
-                let problem = "the same file lies beside it, not compressed";
-                self.problems.push(Error::input(Place::file(&file), problem, "remove one of the two"));
-                continue;
-            }
             let is_highd = own.is_none() && is_of_highd(&file);
             let is_meta = self.preset().is_some_and(|preset| tracks::is_meta(&name, preset));
             if is_highd || is_meta || !tracks::may_hold_tracks(&file) {
                 continue;
             }
-            let found = tracks::detect(&file);
-            let fits = |found: &Option<Preset>| found.as_ref().map(|of| (of.name.clone(), of.format)) == own;
-            if own.is_some() && found.as_ref().is_ok_and(fits) {
-                endings.extend(ending_of(&file));
-            } else {
-                foreign.push((file, found));
+            match tracks::detect(&file) {
+                Ok(Some(found)) if Some(&found.name) == own.as_ref() => endings.extend(tracks::ending(&name)),
+                found => foreign.push((file, found)),
             }
         }
         for (file, found) in foreign {
             self.tracks.retain(|track| track.path != file);
-            let has_ending = ending_of(&file).is_some_and(|ending| endings.contains(&ending));
+            let has_ending = tracks::ending(&file_name(&file)).is_some_and(|ending| endings.contains(&ending));
             match found {
-                _ if is_of_sumo(&file) => {}
                 Ok(Some(other)) => {
                     let problem = format!("it fits preset {}, the other files here do not", other.name);
                     self.problems.push(Error::input(Place::file(&file), problem, "put it into a folder of its own"));
@@ -126,8 +117,7 @@ impl Inputs {
     }
 
     /// The files, and what is wrong with others.
-    pub fn files(mut self) -> (Vec<InputFile>, Vec<Error>) {
-        tracks::keep_apart(&mut self.tracks);
+    pub fn files(self) -> (Vec<InputFile>, Vec<Error>) {
         let with_preset = |file| Some(InputFile::Tracks(file, Box::new(self.preset.clone()?)));
         let tracks = self.tracks.into_iter().filter_map(with_preset);
         (self.highd.into_iter().map(InputFile::Highd).chain(tracks).collect(), self.problems)
@@ -168,12 +158,6 @@ fn is_highd_name(path: &Path) -> bool {
     path.file_name().is_some_and(|name| unpacked(&name.to_string_lossy()).ends_with(HIGHD_ENDING))
 }
 
-/// The ending of a file's name, before that of gzip.
-fn ending_of(path: &Path) -> Option<String> {
-    let name = path.file_name()?.to_string_lossy().into_owned();
-    Some(unpacked(&name).rsplit_once('.')?.1.to_owned())
-}
-
 fn highd_inputs(path: &Path) -> Result<Inputs> {
     if path.is_dir() || !is_highd_name(path) {
         let highd::Inventory { recordings, problems } = highd::inventory(path)?;
@@ -185,7 +169,7 @@ fn highd_inputs(path: &Path) -> Result<Inputs> {
 }
 
 /// The files of a folder, sorted; hidden ones are left out.
-fn files_of(folder: &Path) -> Result<Vec<PathBuf>> {
+pub(super) fn files_of(folder: &Path) -> Result<Vec<PathBuf>> {
     let listed = std::fs::read_dir(folder).map_err(|e| Error::io(folder, "list", e))?;
     let is_hidden = |path: &PathBuf| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
     let mut files: Vec<PathBuf> =
@@ -206,22 +190,13 @@ fn first_track_file(folder: &Path) -> Result<Option<PathBuf>> {
 }
 
 fn has_columns(path: &Path) -> bool {
-    tracks::columns_of(path).is_ok_and(|(columns, _)| columns.len() >= MIN_COLUMNS)
-}
-
-/// Whether a file is one of SUMO's beside its traffic: `demo.rou.xml`.
-fn is_of_sumo(path: &Path) -> bool {
-    ends_with_any(path, &[".rou.xml", ".net.xml", ".add.xml", ".poly.xml", ".trips.xml"])
+    tracks::columns_of(path).is_ok_and(|columns| columns.len() >= MIN_COLUMNS)
 }
 
 /// Whether a file has a name of highD's format.
 fn is_of_highd(path: &Path) -> bool {
-    ends_with_any(path, &highd::SUFFIXES)
-}
-
-fn ends_with_any(path: &Path, endings: &[&str]) -> bool {
     let name = path.to_string_lossy();
-    endings.iter().any(|ending| unpacked(&name).ends_with(ending))
+    highd::SUFFIXES.iter().any(|ending| unpacked(&name).ends_with(ending))
 }
 
 /// The error about a folder without a file that fits: it says what was tried.
@@ -232,10 +207,10 @@ fn nothing_in(folder: &Path) -> Result<Inputs> {
     }
     let tried = |path: &PathBuf| {
         let name = file_name(path);
-        let why = match tracks::detect(path) {
+        let why = match tracks::columns_of(path) {
             _ if tracks::is_compressed(path) => "compressed".to_owned(),
-            _ if !tracks::may_hold_tracks(path) => "no format of tracks".to_owned(),
             Ok(_) => "no preset fits".to_owned(),
+            Err(Error::Input { problem, help, .. }) => format!("{problem}; {help}"),
             Err(error) => error.to_string(),
         };
         format!("{name}: {why}")
@@ -245,7 +220,7 @@ fn nothing_in(folder: &Path) -> Result<Inputs> {
     Err(Error::input(
         Place::file(folder),
         format!("no file here is a recording ({}{more})", tried.join("; ")),
-        "recordings are .csv, .txt, .tsv, .xml, .json (also .gz) or .parquet; `lanesweep tracks FILE` says more of one",
+        "recordings are .csv, .txt, .tsv (also .gz) or .parquet; XML and JSON become tables in Python (`lanesweep.tracks`)",
     ))
 }
 
@@ -255,12 +230,13 @@ fn unknown(path: &Path) -> Error {
         return Error::input(Place::file(path), "an OpenSCENARIO file is no recording", help);
     }
     let columns = match tracks::columns_of(path) {
-        Ok((columns, _)) => {
-            let geographic = columns.iter().filter(|name| tracks::is_geographic(name));
+        Ok(columns) => {
+            let geographic = columns.iter().filter(|name| is_geographic(name));
             let geographic: Vec<String> = geographic.map(|name| format!("`{name}`")).collect();
             if geographic.len() >= 2 {
                 let problem = format!("positions are longitudes and latitudes ({})", geographic.join(", "));
-                return Error::input(Place::file(path), problem, tracks::PROJECT);
+                let help = "project the positions to metres (UTM, for instance) and name the columns x and y";
+                return Error::input(Place::file(path), problem, help);
             }
             let names: Vec<String> = columns.iter().take(30).map(|name| format!("`{name}`")).collect();
             format!("; its columns are {}", names.join(", "))
@@ -270,6 +246,14 @@ fn unknown(path: &Path) -> Error {
     Error::input(
         Place::file(path),
         format!("no preset fits this file{columns}"),
-        "name a preset by option `preset`; `lanesweep tracks` makes a first one (option `write_preset`)",
+        "name a preset by option `preset`, or rename the columns as in the preset `generic`",
     )
+}
+
+/// Whether a name is that of a column of longitudes or latitudes.
+fn is_geographic(name: &str) -> bool {
+    let bare = name.split(['(', '[']).next().unwrap_or(name);
+    let letters: String = bare.chars().filter(|c| c.is_alphabetic()).flat_map(char::to_lowercase).collect();
+    let letters = letters.trim_start_matches("gps").trim_end_matches("deg");
+    ["lon", "lng", "long", "longitude", "lat", "latitude"].contains(&letters)
 }

@@ -19,6 +19,6 @@ pub mod tracks;
 pub use csv_table::FileChecksum;
 pub(crate) use frame_index::FrameIndex;
 pub use inputs::{InputFile, Inputs};
-pub(crate) use noise::{Noise, SUSTAINED_S, running_median};
+pub(crate) use noise::Noise;
 pub(crate) use recording::LIMIT_TOLERANCE_M;
 pub use recording::{Carriageway, EgoViewOptions, Lane, Loaded, NO_LANE, Recording, Track, VehicleClass};

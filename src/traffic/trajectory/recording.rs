@@ -33,10 +33,6 @@ pub struct Loaded {
     pub recording: Recording,
     /// Content of its files: the tracks first (highD: tracks, tracksMeta, recordingMeta).
     pub checksum_sha256: Vec<FileChecksum>,
-    /// Number of rows of tracks.
-    pub rows: u64,
-    /// Size of the files together, bytes.
-    pub bytes: u64,
     /// Warnings about the data, as sentences.
     pub notes: Vec<String>,
     /// Names in the file of the vehicles that have another number.

@@ -16,7 +16,7 @@ use lanesweep::stats::density::{DensityModel, Exposure, read_density};
 use lanesweep::support::plausibility::Implausible;
 use lanesweep::traffic::mining::{MiningOptions, mine, mine_folder};
 use lanesweep::traffic::trajectory::Inputs;
-use lanesweep::traffic::trajectory::tracks::{Preset, TrackFile, draft, read_usable};
+use lanesweep::traffic::trajectory::tracks::{Preset, TrackFile, read_usable};
 use lanesweep::{Error, Place, Result};
 
 use super::seeds::{Seeds, density_of};
@@ -51,8 +51,6 @@ pub fn all(seeds: &Seeds) -> Vec<Reader> {
         plain("proposal", &seeds.proposals, proposal),
         plain("exiD tracks", &seeds.exid, exid),
         plain("track table", &seeds.track_tables, |b, d, _, _| tracks_named("own.csv", b, d)),
-        plain("track XML", &seeds.track_xml, |b, d, _, _| tracks_named("own.xml", b, d)),
-        plain("track JSON", &seeds.track_json, |b, d, _, _| tracks_named("own.json", b, d)),
         plain("preset", &seeds.presets, preset),
     ];
     readers.push(Reader { reseal: Some(reseal_density), ..plain("density", &seeds.densities, density) });
@@ -77,9 +75,8 @@ fn tracks_named(name: &str, bytes: &[u8], dir: &Path) -> Result<()> {
             Ok(())
         })
     });
-    let drafted = draft(&path).map(drop);
     std::fs::remove_file(&path).expect("the temporary folder can be written to");
-    read.and(drafted)
+    read
 }
 
 fn exid(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {

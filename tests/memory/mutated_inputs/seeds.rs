@@ -41,8 +41,6 @@ pub struct Seeds {
     pub proposals: Vec<Vec<u8>>,
     pub exid: Vec<Vec<u8>>,
     pub track_tables: Vec<Vec<u8>>,
-    pub track_xml: Vec<Vec<u8>>,
-    pub track_json: Vec<Vec<u8>>,
     pub presets: Vec<Vec<u8>>,
     pub parts: Vec<Vec<u8>>,
     pub plans: Vec<Vec<u8>>,
@@ -94,8 +92,8 @@ fn track_tables() -> Vec<Vec<u8>> {
             )
         }),
         track_table(
-            "timestep_time;vehicle_id;vehicle_x;vehicle_y;vehicle_angle;vehicle_type;vehicle_speed;vehicle_lane",
-            |v, k, x, y| format!("{:.2};f.{v};{x:.2};{y:.2};90;passenger;30;e_{}", 0.1 * f64::from(k), v % 2),
+            "timestep_time;vehicle_id;vehicle_x;vehicle_y;vehicle_angle;vehicle_type;vehicle_speed;vehicle_lane;vehicle_length;vehicle_width",
+            |v, k, x, y| format!("{:.2};f.{v};{x:.2};{y:.2};90;passenger;30;e_{};5;1.8", 0.1 * f64::from(k), v % 2),
         ),
         track_table(
             "Vehicle_ID,Frame_ID,Local_X,Local_Y,v_length,v_Width,v_Class,v_Vel,v_Acc,Lane_ID,Location",
@@ -110,47 +108,6 @@ fn exid() -> Vec<Vec<u8>> {
         |v, k, x, y| format!("0,{v},{k},{x:.2},{y:.2},0,1.8,4.5,75,0,0,0,0.1;0.2,{};77", v % 2),
     )]
 }
-
-const FCD: &str = "<fcd-export>
-<timestep time=\"0.0\"><vehicle id=\"a\" x=\"1\" y=\"2\" angle=\"90\" type=\"car\" speed=\"30\" pos=\"1\" lane=\"e_0\" slope=\"0\"/><vehicle id=\"b\" x=\"51\" y=\"5\" angle=\"90\" type=\"car\" speed=\"30\" lane=\"e_1\"/></timestep>
-<timestep time=\"0.1\"><vehicle id=\"a\" x=\"4\" y=\"2\" angle=\"90\" type=\"car\" speed=\"30\" pos=\"1\" lane=\"e_0\" slope=\"0\"/><vehicle id=\"b\" x=\"54\" y=\"5\" angle=\"90\" type=\"car\" speed=\"30\" lane=\"e_1\"/></timestep>
-<timestep time=\"0.2\"><vehicle id=\"a\" x=\"7\" y=\"2\" angle=\"90\" type=\"car\" speed=\"30\" pos=\"1\" lane=\"e_0\" slope=\"0\"/><vehicle id=\"b\" x=\"57\" y=\"5\" angle=\"90\" type=\"car\" speed=\"30\" lane=\"e_1\"/></timestep>
-</fcd-export>
-";
-
-fn commonroad() -> Vec<u8> {
-    let state = |k: u32, x: f64| {
-        format!(
-            "<position><point><x>{x}</x><y>1.5</y></point></position><orientation><exact>0</exact></orientation><time><exact>{k}</exact></time><velocity><exact>30</exact></velocity>"
-        )
-    };
-    let obstacle = |id: u32| {
-        let from = 40.0 * f64::from(id);
-        let states: String =
-            (1..5).map(|k| format!("<state>{}</state>", state(k, from + 3.0 * f64::from(k)))).collect();
-        format!(
-            "<dynamicObstacle id=\"{id}\"><type>car</type><shape><rectangle><length>4.5</length><width>1.8</width></rectangle></shape><initialState>{}</initialState><trajectory>{states}</trajectory></dynamicObstacle>",
-            state(0, from)
-        )
-    };
-    let bound = |y: f64| {
-        format!(
-            "<point><x>0</x><y>{y}</y></point><point><x>90</x><y>{y}</y></point><point><x>200</x><y>{y}</y></point>"
-        )
-    };
-    format!(
-        "<commonRoad commonRoadVersion=\"2020a\" timeStepSize=\"0.1\"><lanelet id=\"1\"><leftBound>{}</leftBound><rightBound>{}</rightBound></lanelet>{}{}</commonRoad>",
-        bound(3.5), bound(0.0), obstacle(10), obstacle(11)
-    )
-    .into_bytes()
-}
-
-const AUTOMATUM: &str = r#"{"UUID":"x","objects":[
-{"UUID":"a","type":"car","length":4.5,"width":1.8,"time":[0.0,0.1,0.2,0.3],"x_vec":[0,3,6,9],"y_vec":[0,0,0,0],"psi_vec":[0,0,0,0],"vx_vec":[30,30,30,30],"vy_vec":[0,0,0,0],"ax_vec":[0,0,0,0],"ay_vec":[0,0,0,0],"lane_id_vec":[1,1,1,1]},
-{"UUID":"b","type":"truck","length":14.5,"width":2.5,"time":[0.0,0.1,0.2,0.3],"x_vec":[50,53,56,59],"y_vec":[3,3,3,3],"psi_vec":[0,0,0,0],"vx_vec":[30,30,30,30],"vy_vec":[0,0,0,0],"ax_vec":[0,0,0,0],"ay_vec":[0,0,0,0],"lane_id_vec":[2,2,2,2]}]}"#;
-
-const I24: &str = r#"[{"_id":"5","timestamp":[1623877088.0,1623877088.04,1623877088.08,1623877088.12],"x_position":[100,104,108,112],"y_position":[18,18,18,18],"length":15,"width":6,"coarse_vehicle_class":0,"direction":1},
-{"_id":"6","timestamp":[1623877088.0,1623877088.04,1623877088.08,1623877088.12],"x_position":[300,296,292,288],"y_position":[-18,-18,-18,-18],"length":65,"width":8,"coarse_vehicle_class":4,"direction":-1}]"#;
 
 fn presets() -> Vec<Vec<u8>> {
     let generic = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/presets/generic.toml");
@@ -167,7 +124,6 @@ traffic = "right"
 max_gap_s = 0.5
 smoothing_s = 0.7
 exclude_doubtful = true
-types_file = "*.rou.xml"
 [axes]
 y = "left"
 heading = "from-x"
@@ -292,8 +248,6 @@ impl Seeds {
                 .collect(),
             exid: exid(),
             track_tables: track_tables(),
-            track_xml: vec![FCD.as_bytes().to_vec(), commonroad()],
-            track_json: vec![AUTOMATUM.as_bytes().to_vec(), I24.as_bytes().to_vec()],
             presets: presets(),
             proposals: vec![proposal_text(&density, &density.mixture().unwrap()).unwrap().into_bytes()],
             parts: vec![part],

@@ -42,7 +42,6 @@ pub fn read_checked(files: &HighdFiles, implausible: Implausible) -> Result<Load
     let tracks = read_tracks(&mut table, &columns, &recording_meta, &vehicles, empty, &mut doubts)?;
     let mut notes = notes(&columns, &vehicles, &tracks, recording_meta.frame_rate_hz);
     notes.extend(doubts.sentences());
-    let rows = table.rows();
     let checksum_sha256 = vec![table.finish()?, tracks_meta_checksum, recording_meta.checksum];
     let recording = Recording {
         id: files.id.clone(),
@@ -64,8 +63,7 @@ pub fn read_checked(files: &HighdFiles, implausible: Implausible) -> Result<Load
         }
         notes.push(problem);
     }
-    let bytes = checksum_sha256.iter().map(|file| file.bytes).sum();
-    Ok(Loaded { recording, checksum_sha256, rows, bytes, notes, vehicle_names: BTreeMap::new(), file_frames: None })
+    Ok(Loaded { recording, checksum_sha256, notes, vehicle_names: BTreeMap::new(), file_frames: None })
 }
 
 struct TrackColumns {

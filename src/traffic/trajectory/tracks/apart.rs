@@ -2,9 +2,9 @@
 //! vehicle that comes back after a pause is another vehicle.
 
 use super::preset::Preset;
-use super::raw::RawRecording;
+use super::raw::{RawRecording, RawVehicle};
 use super::road::{median, range};
-use super::samples::Samples;
+use super::samples::{AT, OTHER_CLOCK, Sample, Samples};
 use crate::support::readable::significant;
 
 /// Times of a frame that are farther apart belong to two recordings, s.
@@ -21,14 +21,12 @@ pub(super) fn apart(recordings: Vec<RawRecording>, preset: &Preset) -> Vec<RawRe
     let mut all = Vec::new();
     for recording in recordings {
         let rate_hz = recording.frame_rate_hz.or(preset.frame_rate_hz);
-        let per_s = if recording.has_frames { rate_hz } else { Some(1.0) };
-        let parts = match rate_hz.filter(|_| recording.has_frames) {
-            Some(rate_hz) => periods(recording, rate_hz),
-            None => vec![recording],
-        };
-        for mut part in parts {
-            per_s.into_iter().for_each(|per_s| part_returning(&mut part, per_s, preset));
-            all.push(part);
+        match (recording.has_frames, rate_hz) {
+            (false, _) => all.push(part_returning(recording, 1.0, preset)),
+            (true, None) => all.push(recording),
+            (true, Some(rate_hz)) => {
+                all.extend(periods(recording, rate_hz).into_iter().map(|part| part_returning(part, rate_hz, preset)));
+            }
         }
     }
     all
@@ -37,9 +35,9 @@ pub(super) fn apart(recordings: Vec<RawRecording>, preset: &Preset) -> Vec<RawRe
 /// The recordings of a file whose frames begin again, as NGSIM's do in each of three periods; `id-1`, `id-2`, ….
 fn periods(mut recording: RawRecording, rate_hz: f64) -> Vec<RawRecording> {
     // When its frame 0 would be.
-    let zero_s = |samples: &Samples, k: usize| samples.other_clock(k) - samples.at(k) / rate_hz;
-    let of_vehicle = |samples: &'_ Samples| (0..samples.len()).map(|k| zero_s(samples, k)).collect::<Vec<f64>>();
-    let zeros = || recording.vehicles.iter().flat_map(|of| of_vehicle(&of.samples)).filter(|zero| !zero.is_nan());
+    let zero_s = |samples: &Samples, k: usize| samples.of(OTHER_CLOCK, k) - samples.of(AT, k) / rate_hz;
+    let of_vehicle = |of: &RawVehicle| (0..of.samples.len()).map(|k| zero_s(&of.samples, k)).collect::<Vec<f64>>();
+    let zeros = || recording.vehicles.iter().flat_map(of_vehicle).filter(|zero| !zero.is_nan());
     let (low, high) = range(zeros());
     // Also without times.
     if high - low <= SAME_TIME_S {
@@ -47,22 +45,13 @@ fn periods(mut recording: RawRecording, rate_hz: f64) -> Vec<RawRecording> {
     }
     let mut zeros: Vec<f64> = zeros().collect();
     zeros.sort_by(f64::total_cmp);
-    let mut ratios: Vec<f64> = Vec::new();
-    for vehicle in &mut recording.vehicles {
-        let mut samples = vehicle.samples.to_vec();
-        samples.sort_by(|a, b| a.other_clock.total_cmp(&b.other_clock));
-        vehicle.samples = samples.iter().collect();
-        let pairs = samples.windows(2).filter(|pair| pair[1].other_clock > pair[0].other_clock);
-        ratios.extend(
-            pairs.map(|pair| (pair[1].other_clock - pair[0].other_clock) * rate_hz / (pair[1].at - pair[0].at)),
-        );
-    }
-    let ratio = median(&mut ratios);
+    let steps = recording.vehicles.iter().flat_map(|of| (1..of.samples.len()).map(move |k| (&of.samples, k)));
+    let by = |(samples, k): (&Samples, usize), column: usize| samples.of(column, k) - samples.of(column, k - 1);
+    let forward = steps.filter(|step| by(*step, OTHER_CLOCK) > 0.0 && by(*step, AT) > 0.0);
+    let ratio = median(&mut forward.map(|step| by(step, OTHER_CLOCK) * rate_hz / by(step, AT)).collect::<Vec<_>>());
     if ratio.is_nan() || (ratio - 1.0).abs() > MAX_RATE_DIFFERENCE {
-        let note = format!(
-            "frames and times contradict one another: {rate_hz} frames per second, {} by the times; frames are used",
-            significant(rate_hz / ratio, 3)
-        );
+        let told = significant(rate_hz / ratio, 3);
+        let note = format!("frames are used, of which {rate_hz} are a second; times tell {told}");
         recording.notes.push(note);
         return vec![recording];
     }
@@ -85,8 +74,8 @@ fn periods(mut recording: RawRecording, rate_hz: f64) -> Vec<RawRecording> {
                 None => strays += 1,
             }
         }
-        for (part, samples) in parts.iter_mut().zip(of_part).filter(|(_, samples)| !samples.is_empty()) {
-            part.vehicles.push(vehicle.part(samples));
+        for (part, samples) in parts.iter_mut().zip(of_part).filter(|(_, samples)| samples.len() > 0) {
+            part.vehicles.push(vehicle.part(samples, &part.classes));
         }
     }
     if strays > 0 {
@@ -95,14 +84,14 @@ fn periods(mut recording: RawRecording, rate_hz: f64) -> Vec<RawRecording> {
     parts
 }
 
-/// Makes vehicles of their own of those that come back. `per_s` is the unit of `at` per second.
-fn part_returning(recording: &mut RawRecording, per_s: f64, preset: &Preset) {
+/// Makes vehicles of their own of those that come back. `per_s` is the number of frames, or seconds, per second.
+fn part_returning(mut recording: RawRecording, per_s: f64, preset: &Preset) -> RawRecording {
     let vehicles = std::mem::take(&mut recording.vehicles);
     let numbers = vehicles.len();
     for mut vehicle in vehicles {
         if vehicle.samples.steps().any(|step| step < 0.0) {
             let mut samples = vehicle.samples.to_vec();
-            samples.sort_by(|a, b| a.at.total_cmp(&b.at));
+            samples.sort_by(|a, b| a[AT].total_cmp(&b[AT]));
             vehicle.samples = samples.iter().collect();
         }
         let steps = vehicle.samples.steps().filter(|step| *step > 0.0);
@@ -112,13 +101,15 @@ fn part_returning(recording: &mut RawRecording, per_s: f64, preset: &Preset) {
             continue;
         }
         let samples = vehicle.samples.to_vec();
-        let parts = samples.chunk_by(|a, b| b.at - a.at <= pause);
-        recording.vehicles.extend(parts.map(|part| vehicle.part(part.iter().collect())));
+        let parts = samples.chunk_by(|a, b| b[AT] - a[AT] <= pause);
+        let part = |part: &[Sample]| vehicle.part(part.iter().collect(), &recording.classes);
+        let parts: Vec<RawVehicle> = parts.map(part).collect();
+        recording.vehicles.extend(parts);
     }
     let more = recording.vehicles.len() - numbers;
     if more > 0 {
-        recording
-            .notes
-            .push(format!("{more} times a number comes back after more than {PAUSE_S} s, for another vehicle"));
+        let note = format!("{more} times a number comes back after more than {PAUSE_S} s, for another vehicle");
+        recording.notes.push(note);
     }
+    recording
 }

@@ -4,8 +4,7 @@ use super::boxes::Sized;
 use super::pieces::Piece;
 use super::preset::{Preset, RoadSource};
 use super::raw::RawRecording;
-use super::road::{OnRoad, Path, RoadLine, d_range, dot, median};
-use super::understanding::Understanding;
+use super::road::{OnRoad, Path, RoadLine, dot, median};
 
 /// A piece on its carriageway.
 pub(super) struct Placed {
@@ -70,16 +69,6 @@ pub(super) fn road(
         let mut here: Vec<&Piece> =
             pieces.iter().zip(&forward).filter(|(_, is)| **is == is_forward).map(|(piece, _)| piece).collect();
         here.sort_by(|a, b| size(b).total_cmp(&size(a)).then(a.vehicle.cmp(&b.vehicle)));
-        let of_map = |boundary: &&Path| {
-            let ends = boundary.first().zip(boundary.last());
-            ends.is_some_and(|(a, b)| {
-                (first.project(*b).s_m > first.project(*a).s_m) == (is_forward == longest_is_forward)
-            })
-        };
-        let boundaries: Vec<Path> = raw.boundaries.iter().filter(of_map).map(|boundary| dense(boundary)).collect();
-        if !boundaries.is_empty() && !here.is_empty() {
-            return RoadLine::fit(&boundaries);
-        }
         // Every n-th of them, from the longest on.
         let every = here.len().div_ceil(FITTED_PATHS).max(1);
         RoadLine::fit(&here.into_iter().step_by(every).map(path).collect::<Vec<_>>())
@@ -92,41 +81,6 @@ pub(super) fn road(
         (backward, forward) => [backward, forward],
     };
     Some((lines, forward))
-}
-
-/// A polyline with a point per metre.
-fn dense(points: &[[f64; 2]]) -> Path {
-    let mut path: Path = points.first().copied().into_iter().collect();
-    for pair in points.windows(2) {
-        let by = [pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]];
-        let steps = libm::hypot(by[0], by[1]).ceil().clamp(1.0, 10_000.0) as usize;
-        path.extend((1..=steps).map(|k| {
-            let part = k as f64 / steps as f64;
-            [pair[0][0] + part * by[0], pair[0][1] + part * by[1]]
-        }));
-    }
-    path
-}
-
-pub(super) fn describe_road(about: &mut Understanding, lines: &[Option<RoadLine>; 2], placed: &[Placed]) {
-    about.is_straight = lines.iter().flatten().all(RoadLine::is_straight);
-    about.min_radius_m = lines.iter().flatten().map(RoadLine::min_radius_m).fold(f64::INFINITY, f64::min);
-    let mut ranges = Vec::new();
-    let mut ends = [(f64::INFINITY, f64::NEG_INFINITY); 2];
-    let mut across = 0_u64;
-    for of in placed {
-        let by_m = d_range(&of.on);
-        let travel = of.on[of.on.len() - 1].s_m - of.on[0].s_m;
-        if travel.abs() >= 30.0 || by_m > 15.0 {
-            ranges.push(by_m);
-            across += u64::from(by_m > 15.0);
-        }
-        let here = &mut ends[usize::from(of.is_forward)];
-        *here = of.on.iter().fold(*here, |(l, h), p| (l.min(p.s_m), h.max(p.s_m)));
-    }
-    about.across_fraction = across as f64 / ranges.len().max(1) as f64;
-    about.wander_m = median(&mut ranges);
-    about.length_m = ends.iter().map(|(low, high)| high - low).fold(0.0, f64::max);
 }
 
 /// How far to the left of the forward vehicles the oncoming ones are, m; `None` without both.

@@ -1,43 +1,34 @@
-//! What contradicts itself in a recording: units, axes, boxes, quality.
+//! What contradicts itself in a recording: units, axes, boxes, motion.
+
+use std::collections::HashSet;
 
 use super::preset::{Preset, Side};
 use super::road::{median, range};
-use super::understanding::{Finding, TIMES, Understanding};
-use crate::support::plausibility::{Doubts, Implausible, Limits, NOISE_MPS, Quantity};
-use crate::support::readable::{count, significant, value};
+use super::understanding::{Understanding, median_of};
+use crate::support::plausibility::{Doubts, Implausible, NOISE_MPS, Quantity};
+use crate::support::readable::{significant, value};
 use crate::traffic::trajectory::motion::{Impossible, JUMP_ACROSS_M, JUMP_ALONG_M, impossible, jumps};
 use crate::traffic::trajectory::overlap::overlaps;
 use crate::traffic::trajectory::{NO_LANE, Recording, Track, VehicleClass};
 
-/// Positions and speeds that differ by more than this fraction do not belong together.
+/// Positions and speeds that differ by more than this fraction do not belong together; good data differ by less than 2 %.
 const MAX_SPEED_DIFFERENCE: f64 = 0.05;
-/// Good data differ by less.
-const USUAL_SPEED_DIFFERENCE: f64 = 0.02;
-/// Accelerations that differ from the changes of speed by more, as a fraction and on average (m/s²), decide what is mined.
-const USUAL_ACCELERATION_DIFFERENCE: f64 = 0.25;
-const USUAL_ACCELERATION_OFFSET_MPS2: f64 = 0.2;
-/// Cars whose median is shorter, and lanes that are narrower, are rather a mistake, m.
-const SHORT_CAR_M: f64 = 3.3;
-const NARROW_LANE_M: f64 = 2.6;
 /// A speed that positions tell to vary by more is not constant, m/s.
 const MAX_RANGE_MPS: f64 = 2.0;
 /// Fraction of vehicles that overlap from which on sizes or reference point are wrong.
 const MAX_OVERLAPPING: f64 = 0.1;
-/// Fraction of vehicles that cross the road from which on it is no motorway.
+/// Fraction of vehicles that cross the road by more than the distance (m) from which on it is no motorway.
 const MAX_ACROSS: f64 = 0.15;
-/// Every 25th sample of lorries, and of cars: from so many on, their lanes are compared.
-const MIN_SAMPLES: usize = 20;
+const ACROSS_M: f64 = 15.0;
 /// Fewer vehicles prove nothing.
 const MIN_VEHICLES: usize = 5;
 
-/// Factors that a wrong unit or frame rate would give: positions over speeds, and what it would mean.
-const MISTAKEN: [(f64, &str); 10] = [
+/// Distance over integrated speed that a wrong unit gives, and what it means.
+const MISTAKEN: [(f64, &str); 8] = [
     (1.0 / 3.6, "the speeds look like km/h: add `unit = \"km/h\"`"),
-    (3.6, "the speeds look as if divided by 3.6 twice: they are m/s already"),
     (3.280_84, "the positions look like feet: add `unit = \"ft\"`"),
     (0.3048, "the speeds look like ft/s: add `unit = \"ft/s\"`"),
     (0.447_04, "the speeds look like mph: add `unit = \"mph\"`"),
-    (2.236_94, "the speeds look as if they were converted from mph twice"),
     (1.466_67, "the positions look like feet and the speeds like mph"),
     (25.0 / 30.0, "the frame rate looks like 30 instead of 25"),
     (1.2, "the frame rate looks like 25 instead of 30"),
@@ -45,223 +36,164 @@ const MISTAKEN: [(f64, &str); 10] = [
 ];
 
 impl Understanding {
-    pub(super) fn find(&mut self, is_grave: bool, text: impl Into<String>) {
-        self.findings.push(Finding { is_grave, text: text.into() });
+    /// Tells the shape of the road, and finds tracks that do not follow one.
+    pub(super) fn check_road(&mut self, recording: &Recording) {
+        let mut ends = vec![(f64::INFINITY, f64::NEG_INFINITY); recording.carriageways.len()];
+        let (mut ranges, mut across) = (Vec::new(), 0);
+        for track in &recording.tracks {
+            let (left, right) = range(track.d_m.iter().copied());
+            let along = range(track.s_m.iter().copied());
+            if (track.s_m[track.len() - 1] - track.s_m[0]).abs() >= 30.0 || right - left > ACROSS_M {
+                ranges.push(right - left);
+                across += usize::from(right - left > ACROSS_M);
+            }
+            let of = &mut ends[track.carriageway];
+            *of = (of.0.min(along.0), of.1.max(along.1));
+        }
+        let length_m = ends.iter().map(|(low, high)| high - low).fold(0.0, f64::max);
+        let across = across as f64 / ranges.len().max(1) as f64;
+        let shape = if self.seen.is_curved { "curved" } else { "straight" };
+        let (length, wander) = (significant(length_m, 4), significant(median(&mut ranges), 2));
+        self.fact("road", format!("{shape}, {length} m in view; vehicles wander by {wander} m (0.1 to 0.6 is usual)"));
+        if across > MAX_ACROSS {
+            let percent = significant(100.0 * across, 2);
+            self.refuse(format!(
+                "{percent} % of the vehicles cross the road by more than {ACROSS_M} m: this is no motorway, or vehicles of several roads are in one file"
+            ));
+        }
     }
 
-    /// Finds what makes the tracks unusable.
-    pub(super) fn refuse(&mut self, text: impl Into<String>) {
-        self.find(true, text);
-    }
-
-    /// Finds what is strange in tracks that can be used.
-    pub(super) fn warn(&mut self, text: impl Into<String>) {
-        self.find(false, text);
-    }
-
-    pub(super) fn check_units(&mut self, recording: &Recording) {
-        if self.ratios.len() >= MIN_VEHICLES.min(recording.tracks.len()) && !self.ratios.is_empty() {
-            let ratio = median(&mut self.ratios);
-            self.positions_over_speeds = Some(ratio);
+    /// Compares speeds with positions, and accelerations with speeds.
+    pub(super) fn check_speeds(&mut self, recording: &Recording) {
+        let seen = &mut self.seen;
+        if !seen.ratios.is_empty() && seen.ratios.len() >= MIN_VEHICLES.min(recording.tracks.len()) {
+            let ratio = median(&mut seen.ratios);
+            seen.has_wrong_ratio = (ratio - 1.0).abs() > MAX_SPEED_DIFFERENCE;
+            // A rate that the times give is right.
+            let is_possible = |why: &str| !(seen.rate_is_of_times && why.starts_with("the frame rate"));
+            let near = |(factor, why): &&(f64, &str)| (ratio / factor - 1.0).abs() < 0.06 && is_possible(why);
+            let why = MISTAKEN.iter().find(near).map_or("check units and frame rate", |(_, why)| why);
             let times = significant(ratio, 3);
-            if (ratio - 1.0).abs() > MAX_SPEED_DIFFERENCE {
-                // A rate that the times give is right.
-                let rate = |why: &str| why.starts_with("the frame rate");
-                let near = |(factor, why): &&(f64, &str)| {
-                    (ratio / factor - 1.0).abs() < 0.06 && !(rate(why) && self.rate_source == TIMES)
-                };
-                let why = MISTAKEN.iter().find(near).map_or("check units and frame rate", |(_, why)| why);
+            self.fact("distance", format!("{times} times as far as the speeds tell (median)"));
+            if self.seen.has_wrong_ratio {
                 self.refuse(format!("vehicles move {times} times as far as their speeds tell: {why}"));
-            } else if (ratio - 1.0).abs() > USUAL_SPEED_DIFFERENCE {
-                let why = "distances or speeds are wrong";
-                self.warn(format!("vehicles move {times} times as far as their speeds tell: {why}"));
             }
         }
-        let told = self.acceleration;
+        let told = self.seen.acceleration;
         // Below 0.1 m/s in a second there is nothing to compare.
         if told.count > 50.0 && told.of_given.max(told.of_derived) > 0.01 * told.count {
             let size = libm::sqrt(told.of_given / told.of_derived.max(1e-12));
+            let (times, offset) = (significant(told.slope(), 2), significant(told.difference / told.count, 2));
+            self.fact(
+                "peaks",
+                format!("accelerations are {times} times the changes of speed, {offset} m/s² off on average"),
+            );
             if told.is_opposite() || !(0.4..=2.5).contains(&size) {
+                let (size, sign) = (significant(size, 2), if told.product < 0.0 { "other" } else { "same" });
                 self.refuse(format!(
-                    "accelerations do not fit the changes of speed (they are {} times as large, {}): check their unit and sign",
-                    significant(size, 2),
-                    if told.product < 0.0 { "of the other sign" } else { "of the same sign" }
-                ));
-            } else if (told.slope() - 1.0).abs() > USUAL_ACCELERATION_DIFFERENCE + 4.0 * told.slope_error() {
-                self.warn(format!(
-                    "accelerations are {} times the changes of speed; leader decelerations are kept for the peaks of the former",
-                    significant(told.slope(), 2)
-                ));
-            }
-            let offset_mps2 = told.difference / told.count;
-            if offset_mps2.abs() > USUAL_ACCELERATION_OFFSET_MPS2 {
-                self.warn(format!(
-                    "accelerations are {} m/s² {} the changes of speed on average; leader decelerations are kept for the peaks of the former",
-                    significant(offset_mps2.abs(), 2),
-                    if offset_mps2 < 0.0 { "below" } else { "above" }
+                    "accelerations do not fit the changes of speed ({size} times as large, of the {sign} sign): check their unit and sign"
                 ));
             }
         }
-        let mean = |track: &Track| track.v_s_mps.iter().map(|v| v.max(0.0)).sum::<f64>() / track.len() as f64;
+    }
+
+    /// Finds values that are implausible or impossible: half of the vehicles with one is a unit, not an odd vehicle.
+    pub(super) fn check_units(&mut self, recording: &Recording) {
         // Refused: what is beyond the physical range is grave.
         let mut doubts = Doubts::new(Implausible::Refused);
-        let mut grave: Vec<String> = Vec::new();
+        let mut grave = None;
         let mut check = |quantity: Quantity, value: f64, place: String| {
             if let Err(problem) = doubts.check(quantity, value, || place.clone()) {
-                grave.push(format!("{place}: {problem}"));
+                grave.get_or_insert(format!("{place}: {problem}"));
             }
         };
-        for track in &recording.tracks {
-            check(Quantity::Speed, mean(track), format!("vehicle {}, mean speed", track.id));
-            check(Quantity::Length, track.length_m, format!("vehicle {}", track.id));
-            check(Quantity::Width, track.width_m, format!("vehicle {}", track.id));
+        let mean = |track: &Track| track.v_s_mps.iter().map(|v| v.max(0.0)).sum::<f64>() / track.len() as f64;
+        let length_m = |track: &Track| track.length_m;
+        let width_m = |track: &Track| track.width_m;
+        let of_vehicles: [(Quantity, &dyn Fn(&Track) -> f64); 3] =
+            [(Quantity::Speed, &mean), (Quantity::Length, &length_m), (Quantity::Width, &width_m)];
+        for (quantity, of) in of_vehicles {
+            recording.tracks.iter().for_each(|track| check(quantity, of(track), format!("vehicle {}", track.id)));
         }
-        for of in &self.carriageways {
-            for width_m in of.lane_width_m {
-                check(Quantity::LaneWidth, width_m, format!("carriageway {}", of.name));
-            }
-        }
-        check(Quantity::Rate, self.rate_hz, "frame rate".to_owned());
-        // Half of the vehicles beyond what is plausible is a unit, not an odd vehicle.
-        let general = |quantity: Quantity, of: &dyn Fn(&Track) -> f64| {
-            let (Limits { name, unit, mistaken, .. }, mut values) =
-                (quantity.limits(), recording.tracks.iter().map(of).collect::<Vec<f64>>());
-            let middle = median(&mut values);
-            let hint = mistaken.iter().find(|(_, factor)| quantity.is_plausible(middle / factor));
-            let hint = hint.map_or(String::new(), |(unit, _)| format!(": it looks like {unit}"));
-            let text = || format!("the median {name} is {} {unit}{hint}", significant(middle, 3));
-            (!quantity.is_plausible(middle)).then(text)
-        };
-        let general = [
-            general(Quantity::Speed, &mean),
-            general(Quantity::Length, &|track| track.length_m),
-            general(Quantity::Width, &|track| track.width_m),
-        ];
-        if let Some(first) = grave.first() {
-            let more = if grave.len() > 1 { format!(" ({} more such)", grave.len() - 1) } else { String::new() };
-            self.refuse(format!("{first}{more}"));
-        }
+        let lanes = recording.carriageways.iter().flat_map(|of| of.lane_lines_m.windows(2));
+        lanes.for_each(|two| check(Quantity::LaneWidth, two[0] - two[1], "a lane".to_owned()));
+        check(Quantity::Rate, recording.frame_rate_hz, "frame rate".to_owned());
+        grave.into_iter().for_each(|first| self.refuse(first));
         // A wrong ratio names the unit already.
-        if self.positions_over_speeds.is_none_or(|ratio| (ratio - 1.0).abs() <= MAX_SPEED_DIFFERENCE) {
-            general.into_iter().flatten().for_each(|text| self.refuse(text));
+        let is_named = self.seen.has_wrong_ratio;
+        for (quantity, of) in of_vehicles.into_iter().filter(|_| !is_named) {
+            let middle = median_of(recording, of);
+            if !quantity.is_plausible(middle) {
+                self.refuse(format!("the median vehicle: {}", quantity.describe(middle)));
+            }
         }
-        let narrow =
-            self.carriageways.iter().any(|of| of.lane_width_m.iter().all(|w| !Quantity::LaneWidth.is_plausible(*w)));
-        if narrow {
+        let is_no_lane = |two: &[f64]| !Quantity::LaneWidth.is_plausible(two[0] - two[1]);
+        if recording.carriageways.iter().any(|of| of.lane_lines_m.windows(2).all(is_no_lane)) {
             self.refuse("no lane has a plausible width: check the unit of y, and what `lane` means");
         }
         let lanes = || recording.tracks.iter().flat_map(|track| &track.lane);
         if 2 * lanes().filter(|lane| **lane == NO_LANE).count() > lanes().count() {
             self.refuse("vehicles are mostly in no lane: check the axes, and the lanes in the file");
         }
-        let mut cars_m: Vec<f64> =
-            recording.tracks.iter().filter(|of| of.class == VehicleClass::Car).map(|of| of.length_m).collect();
-        let car_m = median(&mut cars_m);
-        if car_m < SHORT_CAR_M {
-            let car_m = significant(car_m, 3);
-            self.warn(format!("half of the cars are shorter than {car_m} m: check `length` and its unit"));
-        }
-        let widths = self.carriageways.iter().flat_map(|of| of.lane_width_m);
-        let narrowest = widths.fold(f64::INFINITY, f64::min);
-        if !narrow && narrowest < NARROW_LANE_M {
-            self.warn(format!("lanes of {} m are narrow: check the unit of y", significant(narrowest, 3)));
-        }
-        let long =
-            recording.tracks.iter().filter(|track| track.class == VehicleClass::Car && track.length_m >= 9.0).count();
-        if long > 0 && !self.classes.is_empty() {
-            self.warn(format!("{long} vehicle(s) of 9 m and longer are cars by their class: see `classes`"));
-        }
         doubts.sentences().into_iter().for_each(|text| self.warn(text));
-        if self.length_m < 50.0 {
-            let length_m = significant(self.length_m, 3);
-            self.warn(format!("only {length_m} m of road are in view: check the unit of x and y"));
-        }
     }
 
-    /// Finds vehicles that drive backwards; the others' speeds below 0 are noise.
-    pub(super) fn note_backwards(&mut self, recording: &Recording) {
-        for track in &recording.tracks {
-            let backwards = track.v_s_mps.iter().filter(|v| **v < NOISE_MPS).count();
-            if 20 * backwards > track.len() {
-                self.backwards.push(track.id);
-                continue;
-            }
-            let below = track.v_s_mps.iter().filter(|v| **v < 0.0);
-            self.noise_speeds += below.clone().count() as u64;
-            self.lowest_noise_mps = below.fold(self.lowest_noise_mps, |lowest, v| lowest.min(*v));
-        }
-    }
-
+    /// Finds single samples that cannot be, and speeds that do not change.
     pub(super) fn check_motion(&mut self, recording: &Recording) {
-        // A wrong ratio names the unit already.
-        if self.positions_over_speeds.is_some_and(|ratio| (ratio - 1.0).abs() > MAX_SPEED_DIFFERENCE) {
+        if self.seen.has_wrong_ratio {
             return;
         }
         let constant = |track: &&Track| track.v_s_mps.iter().all(|v| (v - track.v_s_mps[0]).abs() < 1e-9);
         let constant: Vec<&Track> = recording.tracks.iter().filter(constant).collect();
-        let contradicted = constant.iter().filter(|track| speed_range_mps(track, self.rate_hz) > MAX_RANGE_MPS).count();
+        let varies = |track: &&&Track| speed_range_mps(track, recording.frame_rate_hz) > MAX_RANGE_MPS;
+        let contradicted = constant.iter().filter(varies).count();
         if contradicted > 0 && 20 * contradicted >= constant.len() && 10 * constant.len() >= 9 * recording.tracks.len()
         {
             self.refuse(format!(
                 "the speed of a vehicle does not change, although {contradicted} move at speeds that differ by more than \
                  {MAX_RANGE_MPS} m/s: it is one speed per vehicle; leave out the column, so that speeds follow from positions"
             ));
-            return;
-        }
-        if let Some(Impossible { vehicles, first: (vehicle, frame), is_speed, problem }) = impossible(recording) {
-            let help = match is_speed {
-                true if self.derived_speeds == recording.tracks.len() as u64 => {
-                    "correct the positions, or smooth them (`smoothing_s`)"
-                }
-                true => "name the text that stands for no value in `none`, or leave out the column of speeds",
-                false => "correct the values, or derive them from smoothed positions (`smoothing_s`)",
-            };
+        } else if let Some(Impossible { vehicles, first: (vehicle, frame), problem, .. }) = impossible(recording) {
             self.refuse(format!(
-                "{vehicles} vehicle(s) have samples that cannot be, the first is vehicle {vehicle} at frame {frame}: {problem}; {help}"
+                "{vehicles} vehicle(s) have samples that cannot be, the first is vehicle {vehicle} at frame {frame}: {problem}; correct them, name the text that stands for no value in `none`, leave out the column, or smooth the positions (`smoothing_s`)"
             ));
         }
     }
 
     pub(super) fn check_axes(&mut self, recording: &Recording, preset: &Preset) {
-        if self.lateral.correlation() < -0.5 && self.lateral.is_opposite() && recording.tracks.len() >= MIN_VEHICLES {
+        let seen = &self.seen;
+        let (lateral, heading) = (seen.lateral, seen.heading);
+        if lateral.correlation() < -0.5 && lateral.is_opposite() && recording.tracks.len() >= MIN_VEHICLES {
             self.refuse("vehicles move across the road against their lateral speeds: y, or the lateral speed, is mirrored; see `axes.y`");
         }
-        if let Some((cosine, lateral)) = self.heading_facts {
+        if let Some((cosine, across)) = heading {
             if cosine < 0.9 {
                 self.refuse(format!(
                     "headings and motion differ (median cosine {}): check the unit of the heading, and `axes.heading` (from-x or from-north)",
                     significant(cosine, 2)
                 ));
-            } else if lateral.slope() < -0.3 && lateral.correlation() < -0.3 && lateral.is_opposite() {
+            } else if across.slope() < -0.3 && across.correlation() < -0.3 && across.is_opposite() {
                 self.refuse(
                     "headings turn against the motion across the road: y, or the heading, is mirrored; see `axes.y`",
                 );
             }
         }
-        if self.across_fraction > MAX_ACROSS {
-            self.refuse(format!(
-                "{} % of the vehicles cross the road by more than 15 m: this is no motorway, or vehicles of several roads are in one file",
-                significant(100.0 * self.across_fraction, 2)
-            ));
-        }
-        let keeps = if preset.traffic == Side::Left { "left" } else { "right" };
-        if let Some(oncoming) = self.oncoming_left_m {
-            let is_left_hand = oncoming < 0.0;
-            if is_left_hand != (preset.traffic == Side::Left) {
+        let is_left = preset.traffic == Side::Left;
+        match self.seen.oncoming_left_m {
+            Some(oncoming_m) if (oncoming_m < 0.0) != is_left => {
+                let [is, set] = if is_left { ["left", "right"] } else { ["right", "left"] };
                 self.refuse(format!(
-                    "oncoming vehicles are on the {} of the vehicles, which does not fit traffic on the {keeps}: y is mirrored (`axes.y`), or set `traffic = \"{}\"`",
-                    if is_left_hand { "right" } else { "left" },
-                    if is_left_hand { "left" } else { "right" },
+                    "oncoming vehicles are on the {is} of the vehicles, which does not fit `traffic`: y is mirrored (`axes.y`), or set `traffic = \"{set}\"`"
                 ));
             }
-        } else {
-            self.check_slow_side(recording, preset, keeps);
+            Some(_) => (),
+            None => self.check_slow_side(recording, is_left),
         }
-        if let Some(difference) = self.lane_offset_error_m.filter(|difference| *difference > 0.5) {
-            let by = significant(difference, 2);
-            self.warn(format!("offsets in the lane differ from the positions by {by} m (median) and are not used"));
+        if let Some(by_m) = self.seen.lane_offset_error_m {
+            let used = if by_m > 0.5 { ": not used" } else { "" };
+            self.fact("in the lane", format!("{} m (median) from the line of the road{used}", significant(by_m, 2)));
         }
-        if let Some(mismatch) = self.label_mismatch.filter(|mismatch| *mismatch > 0.05) {
+        if let Some(mismatch) = self.seen.label_mismatch.filter(|mismatch| *mismatch > 0.05) {
             let percent = significant(100.0 * mismatch, 2);
             let text =
                 format!("{percent} % of the samples are not where the name of their lane says; positions decide");
@@ -270,149 +202,67 @@ impl Understanding {
     }
 
     /// Lorries drive on the slow side.
-    fn check_slow_side(&mut self, recording: &Recording, preset: &Preset, keeps: &str) {
-        // Mean over the vehicles, and the square of its standard error.
-        let mean_lane = |class: VehicleClass| {
-            let known = |track: &&Track| track.class == class && track.lane.iter().any(|lane| *lane != NO_LANE);
-            let of_vehicle = |track: &Track| {
-                let lanes = track.lane.iter().filter(|lane| **lane != NO_LANE);
-                lanes.clone().map(|lane| f64::from(*lane)).sum::<f64>() / lanes.count() as f64
-            };
-            let tracks: Vec<&Track> = recording.tracks.iter().filter(known).collect();
-            let lanes: Vec<f64> = tracks.iter().map(|track| of_vehicle(track)).collect();
-            let mean = lanes.iter().sum::<f64>() / lanes.len() as f64;
-            let spread = lanes.iter().map(|lane| (lane - mean) * (lane - mean)).sum::<f64>();
-            let samples = tracks.iter().map(|track| track.len().div_ceil(25)).sum::<usize>();
-            let error = if lanes.len() < MIN_VEHICLES {
-                f64::INFINITY
-            } else {
-                spread / (lanes.len() * (lanes.len() - 1)) as f64
-            };
-            (samples >= MIN_SAMPLES).then_some((mean, error))
+    fn check_slow_side(&mut self, recording: &Recording, is_left: bool) {
+        let lane = |track: &Track| {
+            let lanes = track.lane.iter().filter(|lane| **lane != NO_LANE);
+            let mean = lanes.clone().map(|lane| f64::from(*lane)).sum::<f64>() / lanes.count() as f64;
+            (!mean.is_nan()).then(|| (f64::from(u8::from(track.class == VehicleClass::Truck)), mean, 0))
         };
-        let (Some((cars, of_cars)), Some((trucks, of_trucks))) =
-            (mean_lane(VehicleClass::Car), mean_lane(VehicleClass::Truck))
-        else {
-            if self.carriageways.iter().any(|of| of.lanes > 1) {
+        let found = slope_within(&mut recording.tracks.iter().filter_map(lane).collect::<Vec<_>>());
+        // Lane 0 is the leftmost.
+        match found {
+            Some((by, error)) if by.abs() > 0.15 && (by > 0.0) == is_left => {
+                let side = if by > 0.0 { "right" } else { "left" };
+                self.find(by.abs() > 4.0 * error, format!(
+                    "lorries drive in the lanes on the {side}, which does not fit `traffic`: y is mirrored (`axes.y`), or set `traffic`, or they are few"
+                ));
+            }
+            None if recording.carriageways.iter().any(|of| of.lane_count() > 1) => {
                 self.warn("one direction of travel and few lorries: nothing tells whether y is mirrored");
             }
-            return;
-        };
-        // Lane 0 is the leftmost.
-        let slow_is_right = trucks > cars;
-        let by = (trucks - cars).abs();
-        if by > 0.15 && slow_is_right == (preset.traffic == Side::Left) {
-            let is_certain = by > 4.0 * (of_cars + of_trucks).sqrt();
-            self.find(is_certain, format!(
-                "{} drive in the lanes on the {}, which does not fit traffic on the {keeps}: y is mirrored (`axes.y`), or set `traffic`{}",
-                if is_certain { "lorries" } else { "few lorries" },
-                if slow_is_right { "right" } else { "left" },
-                if is_certain { "" } else { ", or this is chance" }
-            ));
+            _ => (),
         }
     }
 
+    /// Finds boxes that overlap or are beside the middle of their lanes, and small jumps.
     pub(super) fn check_boxes(&mut self, recording: &Recording) {
         if let Some(found) = overlaps(recording) {
-            let mut involved: Vec<usize> = found.pairs.iter().flat_map(|(a, b)| [*a, *b]).collect();
-            involved.sort_unstable();
-            involved.dedup();
+            let involved: HashSet<usize> = found.pairs.iter().flat_map(|(a, b)| [*a, *b]).collect();
             let fraction = involved.len() as f64 / recording.tracks.len() as f64;
-            let is_grave = fraction > MAX_OVERLAPPING && involved.len() >= MIN_VEHICLES;
-            self.find(is_grave, format!(
-                "{} pairs of vehicles overlap, the first are {}: check sizes and `reference` (centre, front, rear, corner)",
-                found.pairs.len(),
-                found.first
+            let (pairs, first) = (found.pairs.len(), &found.first);
+            self.find(fraction > MAX_OVERLAPPING && involved.len() >= MIN_VEHICLES, format!(
+                "{pairs} pairs of vehicles overlap, the first are {first}: check sizes and `reference` (centre, front, rear, corner)"
             ));
-            for (a, b) in &found.pairs {
-                let shorter = if recording.tracks[*a].len() < recording.tracks[*b].len() { a } else { b };
-                self.doubtful.push(recording.tracks[*shorter].id);
-            }
         }
-        let edge = edge_slope(recording).map(|(slope, error)| (slope.abs(), error)).filter(|(slope, _)| *slope >= 0.6);
-        if let Some((slope, error)) = edge {
-            let what = "the position is that of an edge or a corner; see `reference`";
-            if slope < 1.6 && slope > 4.0 * error {
-                let part = significant(slope, 2);
-                self.refuse(format!(
-                    "wide vehicles are beside the middle of their lanes by {part} of half their width: {what}"
-                ));
-            } else if slope > 0.6 {
-                self.warn(format!("too few vehicles to tell whether {what}"));
-            }
+        if let Some((slope, error)) = edge_slope(recording).filter(|(slope, _)| slope.abs() >= 0.6) {
+            let part = significant(slope.abs(), 2);
+            self.find(slope.abs() < 1.6 && slope.abs() > 4.0 * error, format!(
+                "wide vehicles are beside the middle of their lanes by {part} of half their width: the position is that of an edge or a corner, see `reference`, or they are few"
+            ));
         }
-        if self.assumed_sizes > 0 {
-            let number = count(self.assumed_sizes);
-            let instead = "`sizes` of the preset, or usual ones, take its place";
-            self.warn(format!("{number} vehicles have no size in the file; {instead}"));
-        }
-        if self.changing_sizes > 0 {
-            let number = count(self.changing_sizes);
-            self.warn(format!("the size of {number} vehicles varies by more than a tenth; the median is used"));
-        }
+        let jumping = recording.tracks.iter().filter(|track| jumps(track, recording.frame_rate_hz)).count();
+        let what = format!("tracks jump by more than {JUMP_ALONG_M} m along or {JUMP_ACROSS_M} m across the road");
+        self.warn_of(jumping as u64, &what);
     }
 
-    pub(super) fn check_quality(&mut self, recording: &Recording) {
-        let is_jumping = |track: &&Track| jumps(track, recording.frame_rate_hz);
-        let jumping: Vec<u32> = recording.tracks.iter().filter(is_jumping).map(|track| track.id).collect();
-        if let Some(first) = jumping.first() {
-            self.warn(format!(
-                "{} tracks jump by more than {JUMP_ALONG_M} m along or {JUMP_ACROSS_M} m across the road, the first is vehicle {first}",
-                jumping.len()
-            ));
-            self.doubtful.extend(&jumping);
-        }
+    /// Leaves out vehicles that drive backwards; the others' speeds below 0 are noise and become 0.
+    pub(super) fn leave_out_backwards(&mut self, recording: &mut Recording) {
+        let all = recording.tracks.len();
         let against = |track: &&Track| track.s_m[track.len() - 1] - track.s_m[0] < -5.0;
         let against = recording.tracks.iter().filter(against).count();
-        if against > 0 {
-            let is_grave = 10 * against > recording.tracks.len();
-            let text = format!("{against} vehicle(s) move against their direction of travel: check `direction`");
-            self.find(is_grave, text);
+        let what = "vehicle(s) move against their direction of travel: check `direction`";
+        self.find_of(against as u64, 10 * against > all, what);
+        let slow = |track: &Track| track.v_s_mps.iter().filter(|v| **v < NOISE_MPS).count();
+        recording.tracks.retain(|track| 20 * slow(track) <= track.len());
+        let backwards = all - recording.tracks.len();
+        let what = "vehicles drive backwards (faster than 0.5 m/s) and are left out: check `direction` and the signs of the speeds";
+        self.find_of(backwards as u64, 5 * backwards > all, what);
+        let (mut noise, mut lowest) = (0, 0.0_f64);
+        for v in recording.tracks.iter_mut().flat_map(|track| &mut track.v_s_mps) {
+            (noise, lowest) = (noise + u64::from(*v < 0.0), lowest.min(*v));
+            *v = v.max(0.0);
         }
-        for [a, b] in [["x_speed", "y_speed"], ["y_speed", "x_speed"], ["x_acceleration", "y_acceleration"]] {
-            let has = |key: &str| self.columns.iter().any(|(role, _)| *role == key);
-            if has(a) && !has(b) {
-                self.warn(format!("`{a}` is not used without `{b}`; `speed` is a speed along the road"));
-            }
-        }
-        let backwards = self.backwards.len();
-        if backwards > 0 {
-            let is_grave = 5 * backwards > recording.tracks.len();
-            self.find(is_grave, format!(
-                "{backwards} vehicles drive backwards (faster than 0.5 m/s) and are left out: check `direction` and the signs of the speeds"
-            ));
-        }
-        let notes = [
-            (self.incomplete, "rows have no position and are left out"),
-            (self.duplicates, "rows repeat vehicle and time of another row and are left out"),
-            (self.short_pieces, "piece(s) of tracks are too short to be used"),
-        ];
-        for (number, what) in notes {
-            if number > 0 {
-                self.warn(format!("{} {what}", count(number)));
-            }
-        }
-        if self.noise_speeds > 0 {
-            let (number, lowest) = (count(self.noise_speeds), value(self.lowest_noise_mps));
-            self.warn(format!("{number} speeds below 0 count as 0; the lowest is {lowest} m/s"));
-        }
-        if self.conflicts > 0 {
-            let number = count(self.conflicts);
-            let help = "check `vehicle` and `time`";
-            let text = format!("{number} of these rows name another position; the first row counts: {help}");
-            let samples: usize = recording.tracks.iter().map(Track::len).sum();
-            self.find(100 * self.conflicts > samples as u64, text);
-        }
-        if self.interpolated > 0 {
-            let why = match self.off_raster_frames > 0.02 {
-                true => format!("times are off the raster by up to {} frames", significant(self.off_raster_frames, 2)),
-                false => "gaps are filled".to_owned(),
-            };
-            self.warn(format!("{} samples are of tracks that were interpolated: {why}", count(self.interpolated)));
-        }
-        if !self.vehicle_names.is_empty() {
-            self.warn("vehicles have other numbers than in the file: their ids are no small whole numbers, or a track was split; the ids of scenarios keep the file's");
-        }
+        self.warn_of(noise, &format!("speeds below 0 count as 0; the lowest is {} m/s", value(lowest)));
     }
 }
 
@@ -442,8 +292,8 @@ fn edge_slope(recording: &Recording) -> Option<(f64, f64)> {
     (0..recording.carriageways.len()).filter_map(of).max_by(|a, b| (a.0 / a.1).abs().total_cmp(&(b.0 / b.1).abs()))
 }
 
-/// Slope within groups, so that the middles of the lanes do not matter, and its standard error; `None` if the widths hardly
-/// vary.
+/// Slope of the second value over the first within groups, so that the middles of lanes do not matter, and its standard error;
+/// `None` for few values, or if the first hardly varies.
 fn slope_within(pairs: &mut [(f64, f64, u16)]) -> Option<(f64, f64)> {
     pairs.sort_by(|a, b| a.2.cmp(&b.2).then(a.0.total_cmp(&b.0)).then(a.1.total_cmp(&b.1)));
     let (mut xx, mut xy, mut yy, mut n, mut groups) = (0.0, 0.0, 0.0, 0, 0);

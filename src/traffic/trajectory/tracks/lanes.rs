@@ -1,7 +1,6 @@
 //! Lane lines of a carriageway, from the lateral positions of its vehicles: by the names of lanes in the file, by bands of
 //! a known width, or by where vehicles drive.
 
-use super::raw::NO_LABEL;
 use super::road::median;
 
 /// Lanes are at least so far apart, m.
@@ -22,33 +21,21 @@ const VALLEY: f64 = 0.7;
 const MAX_LANES: usize = 32;
 
 /// Lateral position and name of the lane of a sample.
-pub(super) type Lateral = (f64, u32);
+pub(super) type Lateral = (f64, Option<u32>);
 
-/// How the lane lines were found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum LaneSource {
-    /// Names of lanes in the file.
-    Names,
-    /// Bands of a known width.
-    Bands,
-    /// Positions of the vehicles.
-    Positions,
-    /// Boundaries of a map.
-    Map,
-    /// Lane lines in the file.
-    Lines,
-}
+/// Where lane lines come from.
+pub(super) const BY_NAME: &str = "the names of lanes in the file";
 
 /// Lane lines from left to right; `None` without samples.
-pub(super) fn lane_lines(samples: &[Lateral], width_m: Option<f64>) -> Option<(Vec<f64>, LaneSource)> {
+pub(super) fn lane_lines(samples: &[Lateral], width_m: Option<f64>) -> Option<(Vec<f64>, &'static str)> {
     if samples.is_empty() {
         return None;
     }
     let named = centres_by_name(samples);
     let (centres, source) = match (named.is_empty(), width_m) {
-        (_, Some(width_m)) => return Some((bands(samples, width_m), LaneSource::Bands)),
-        (false, None) => (named, LaneSource::Names),
-        (true, None) => (centres_by_position(samples), LaneSource::Positions),
+        (_, Some(width_m)) => return Some((bands(samples, width_m), "bands of the width in the preset")),
+        (false, None) => (named, BY_NAME),
+        (true, None) => (centres_by_position(samples), "where vehicles drive"),
     };
     Some((lines_around(&centres), source))
 }
@@ -93,7 +80,7 @@ fn bands(samples: &[Lateral], width_m: f64) -> Vec<f64> {
 
 /// Medians of the names' lateral positions, from left to right; names of one lane along the road are joined.
 fn centres_by_name(samples: &[Lateral]) -> Vec<f64> {
-    let mut sorted: Vec<Lateral> = samples.iter().copied().filter(|(_, label)| *label != NO_LABEL).collect();
+    let mut sorted: Vec<Lateral> = samples.iter().copied().filter(|(_, name)| name.is_some()).collect();
     sorted.sort_by(|a, b| a.1.cmp(&b.1).then(a.0.total_cmp(&b.0)));
     let total = sorted.len() as f64;
     let groups = sorted.chunk_by(|a, b| a.1 == b.1);
@@ -102,24 +89,17 @@ fn centres_by_name(samples: &[Lateral]) -> Vec<f64> {
         .map(|group| (group[group.len() / 2].0, group.len() as f64))
         .collect();
     centres.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut joined = joined(centres, MIN_SPACING_M);
-    joined.truncate(MAX_LANES);
-    joined
-}
-
-/// Values in falling order, with weights; those that are nearer to one another become their mean.
-fn joined(falling: impl IntoIterator<Item = (f64, f64)>, apart_m: f64) -> Vec<f64> {
     let mut joined: Vec<(f64, f64)> = Vec::new();
-    for (d_m, weight) in falling {
+    for (d_m, weight) in centres {
         match joined.last_mut() {
-            Some((of, sum)) if *of - d_m < apart_m => {
+            Some((of, sum)) if *of - d_m < MIN_SPACING_M => {
                 *of = (*of * *sum + d_m * weight) / (*sum + weight);
                 *sum += weight;
             }
             _ => joined.push((d_m, weight)),
         }
     }
-    joined.into_iter().map(|(d_m, _)| d_m).collect()
+    joined.into_iter().map(|(d_m, _)| d_m).take(MAX_LANES).collect()
 }
 
 /// Peaks of the density of lateral positions, from left to right.
@@ -166,12 +146,6 @@ fn centres_by_position(samples: &[Lateral]) -> Vec<f64> {
     if centres.is_empty() { vec![d[d.len() / 2]] } else { centres }
 }
 
-/// Lane lines of a map, from the lateral positions of its boundaries: those that are near one another are one.
-pub(super) fn lines_of_map(mut d: Vec<f64>) -> Vec<f64> {
-    d.sort_by(|a, b| b.total_cmp(a));
-    joined(d.into_iter().map(|line| (line, 1.0)), 0.8)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -179,7 +153,7 @@ mod tests {
     fn driven(centres: &[f64], labels: bool) -> Vec<Lateral> {
         let wander = |k: usize| 0.35 * libm::sin(k as f64 * 0.7) + 0.2 * libm::sin(k as f64 * 0.13);
         let of = |lane: usize, centre: &f64| -> Vec<Lateral> {
-            let label = if labels { lane as u32 } else { NO_LABEL };
+            let label = labels.then_some(lane as u32);
             (0..400).map(|k| (centre + wander(k), label)).collect()
         };
         centres.iter().enumerate().flat_map(|(lane, centre)| of(lane, centre)).collect()
@@ -190,14 +164,14 @@ mod tests {
         let centres = [-1.8, -5.5, -9.1];
         for labels in [true, false] {
             let (lines, source) = lane_lines(&driven(&centres, labels), None).unwrap();
-            assert_eq!(source, if labels { LaneSource::Names } else { LaneSource::Positions });
+            assert_eq!(source == BY_NAME, labels);
             assert_eq!(lines.len(), 4);
             for (line, expected) in lines.iter().zip([0.03, -3.65, -7.3, -10.93]) {
                 assert!((line - expected).abs() < 0.25, "{lines:?}");
             }
         }
         let (lines, source) = lane_lines(&driven(&[-1.83, -5.49], false), Some(3.6576)).unwrap();
-        assert_eq!((lines, source), (vec![0.0, -3.6576, -7.3152], LaneSource::Bands));
+        assert_eq!((lines, source), (vec![0.0, -3.6576, -7.3152], "bands of the width in the preset"));
         // Nobody in the middle lane.
         let (lines, _) = lane_lines(&driven(&[-1.8, -9.1], true), None).unwrap();
         assert!(lines.len() == 4 && (lines[1] - -3.6).abs() < 0.25, "{lines:?}");

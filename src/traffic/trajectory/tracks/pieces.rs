@@ -3,11 +3,11 @@
 use std::borrow::Cow;
 
 use super::preset::Preset;
-use super::raw::{RawRecording, RawSample};
+use super::raw::{RawRecording, RawVehicle};
 use super::road::{cross, dot, median, unit};
-use super::samples::Samples;
-use super::understanding::{TIMES, Understanding};
-use crate::support::readable::significant;
+use super::samples::{AT, Sample, Samples, X, Y, between};
+use super::understanding::Understanding;
+use crate::support::readable::{significant, value};
 use crate::{Error, Place, Result};
 
 /// A sample this far off the raster of times, in frames, is interpolated.
@@ -42,144 +42,162 @@ pub(super) fn pieces(
     about: &mut Understanding,
     place: &Place,
 ) -> Result<(f64, Vec<Piece>)> {
-    for vehicle in &mut raw.vehicles {
-        if vehicle.samples.steps().all(|step| step > 0.0) {
-            continue;
-        }
-        let mut samples = vehicle.samples.to_vec();
-        samples.sort_by(|a, b| a.at.total_cmp(&b.at));
-        let count = samples.len();
-        samples.dedup_by(|later, first| {
-            let is_repeated = later.at == first.at;
-            let apart_m = |axis: usize| (later.xy_m[axis] - first.xy_m[axis]).abs();
-            about.conflicts += u64::from(is_repeated && apart_m(0).max(apart_m(1)) > SAME_PLACE_M);
-            is_repeated
-        });
-        about.duplicates += (count - samples.len()) as u64;
-        vehicle.samples = samples.iter().collect();
-    }
+    leave_out_repeated(&mut raw.vehicles, about);
     let bad = |problem: &str, help: &str| Error::input(place.clone(), problem, help);
-    let mut steps: Vec<f64> = raw.vehicles.iter().flat_map(|vehicle| vehicle.samples.steps()).collect();
-    if steps.is_empty() {
-        return Err(bad("no vehicle has two samples", "check the columns for vehicle and time"));
-    }
-    let step = median(&mut steps);
-    let origin = raw.vehicles.iter().map(|vehicle| vehicle.samples.at(0)).fold(f64::INFINITY, f64::min);
-    // (frames of the recording per unit of `at`, frame at the origin)
-    let (rate_hz, scale, first) = if raw.has_frames {
-        let rate_hz = raw.frame_rate_hz.or(preset.frame_rate_hz).ok_or_else(|| {
-            bad("the frame rate is unknown", "set `frame_rate_hz` in the preset, or name a column for `time`")
-        })?;
-        about.rate_source = if raw.frame_rate_hz.is_some() { "meta file" } else { "preset" }.to_owned();
-        let stride = step.round().max(1.0);
-        if stride > 1.0 {
-            let (source, apart_s) = (&about.rate_source, significant(stride / rate_hz, 3));
-            let text = format!(
-                "frame numbers rise by {stride} from row to row; at {rate_hz} frames per second ({source}), rows are {apart_s} s apart"
-            );
-            about.warn(text);
-        }
-        (rate_hz / stride, 1.0 / stride, origin / stride)
-    } else {
-        let rate_hz = rate_of_times(raw, step);
-        about.rate_source = TIMES.to_owned();
-        if let Some(said) = preset.frame_rate_hz.filter(|said| (said / rate_hz - 1.0).abs() > 0.02) {
-            about.refuse(format!("the times have {rate_hz:.2} frames per second, the preset says {said}"));
-        }
-        (rate_hz, rate_hz, if origin.abs() < 1e6 { origin * rate_hz } else { 0.0 })
-    };
-    if !(0.1..=1e4).contains(&rate_hz) {
-        return Err(bad(
-            &format!("{rate_hz} frames per second: the times or the frame rate are wrong"),
-            "check the unit of `time` (s, ms, us, ns, date), or `frame_rate_hz`",
-        ));
-    }
-    let factor = preset.resample_hz.map_or(1.0, |wanted| wanted / rate_hz);
-    let rate_hz = rate_hz * factor;
-    about.rate_hz = rate_hz;
-    let frame = |at: f64| first.round() * factor + (at - origin) * scale * factor;
+    let clock = Clock::of(raw, preset, about, &bad)?;
+    let Clock { rate_hz, factor, .. } = clock;
     let max_gap = (preset.max_gap_s * rate_hz).max(1.0) + 0.5 + factor;
-    let time_s = |at: f64| frame(at) / rate_hz;
     let mut differences_m: Vec<f64> =
-        raw.vehicles.iter().flat_map(|of| step_differences_m(&of.samples.to_vec(), time_s)).collect();
+        raw.vehicles.iter().flat_map(|of| step_differences_m(&of.samples.to_vec(), &clock)).collect();
     let jump_m = JUMP_M.max(JUMP_OVER_NOISE * median(&mut differences_m));
     drop(differences_m);
+    let vehicles = raw.vehicles.len();
     let rows: usize = raw.vehicles.iter().map(|vehicle| vehicle.samples.len()).sum();
     let mut pieces = Vec::new();
-    let mut total = 0.0;
+    let (mut total, mut jumps, mut short, mut interpolated) = (0.0, 0, 0, 0);
     let mut first_jump = None;
     for (vehicle, of) in raw.vehicles.iter_mut().enumerate() {
         // From here on, pieces hold them.
-        let mut stored = std::mem::take(&mut of.samples);
-        let samples = stored.to_vec();
-        let differences_m = step_differences_m(&samples, time_s);
+        let samples = std::mem::take(&mut of.samples).to_vec();
+        let differences_m = step_differences_m(&samples, &clock);
+        let frames: Vec<f64> = samples.iter().map(|sample| clock.frame(sample[AT])).collect();
         let mut from = 0;
         for to in 1..=samples.len() {
-            if to < samples.len() && frame(samples[to].at) - frame(samples[to - 1].at) <= max_gap {
+            if to < samples.len() && frames[to] - frames[to - 1] <= max_gap {
                 let by_m = differences_m[to - 1];
                 if by_m <= jump_m {
                     continue;
                 }
-                about.jumps += 1;
-                first_jump.get_or_insert((of.key.clone(), frame(samples[to].at).round(), by_m));
+                jumps += 1;
+                first_jump.get_or_insert((of.key.clone(), frames[to].round(), by_m));
             }
-            let piece = &samples[from..to];
+            let (piece, frames) = (&samples[from..to], &frames[from..to]);
             from = to;
-            let frames: Vec<f64> = piece.iter().map(|sample| frame(sample.at)).collect();
             total += frames[frames.len() - 1] - frames[0] + 1.0;
             if total > SAMPLES_PER_ROW * rows as f64 + FREE_SAMPLES {
                 let problem = "the tracks have far more frames than the file has rows";
                 return Err(bad(problem, "check the unit of `time`, the frame rates and `max_gap_s`"));
             }
-            let (at_frames, first_frame) = at_frames(piece, &frames, about);
-            if at_frames.len() >= MIN_PIECE {
-                let is_whole = matches!(at_frames, Cow::Borrowed(_)) && piece.len() == samples.len();
-                let samples = if is_whole { std::mem::take(&mut stored) } else { at_frames.iter().collect() };
-                pieces.push(Piece { vehicle, first_frame, samples });
-            } else {
-                about.short_pieces += 1;
+            let (at_frames, first_frame) = at_frames(piece, frames);
+            interpolated += if let Cow::Owned(samples) = &at_frames { samples.len() as u64 } else { 0 };
+            if at_frames.len() < MIN_PIECE {
+                short += 1;
+                continue;
             }
+            pieces.push(Piece { vehicle, first_frame, samples: at_frames.iter().collect() });
         }
     }
-    about.split_tracks = (pieces.len() as u64).saturating_sub(raw.vehicles.len() as u64 + about.jumps);
-    if about.split_tracks > 0 {
-        let text = format!(
-            "gaps longer than {} s split the tracks of {} vehicles into {}: see `max_gap_s`",
-            preset.max_gap_s,
-            raw.vehicles.len(),
-            pieces.len()
-        );
-        about.find(about.split_tracks > raw.vehicles.len() as u64, text);
-    }
+    let gaps = pieces.len().saturating_sub(vehicles + jumps);
+    about.find_of(gaps as u64, gaps > vehicles, "gaps longer than `max_gap_s` split tracks");
     if let Some((vehicle, frame, by_m)) = first_jump {
-        let text = format!(
-            "{} step(s) that no vehicle makes split tracks, the first is that of vehicle {vehicle} to frame {frame}, by {} m: a number \
-             used again, or wrong positions",
-            about.jumps,
-            significant(by_m, 3)
-        );
-        about.find(about.jumps > raw.vehicles.len() as u64, text);
+        let by_m = significant(by_m, 3);
+        about.find(jumps > vehicles, format!(
+            "{jumps} step(s) that no vehicle makes split tracks, the first is that of vehicle {vehicle} to frame {frame}, by {by_m} m: a number used again, or wrong positions"
+        ));
     }
+    about.warn_of(short, "piece(s) of tracks are too short to be used");
+    about.warn_of(interpolated, "samples are of tracks that were interpolated: gaps, or times off the raster");
     if pieces.is_empty() {
         return Err(bad("no vehicle is in view for three samples", "check the columns for vehicle and time"));
     }
     Ok((rate_hz, pieces))
 }
 
+/// Sorts the samples of each vehicle by time, and leaves out all but the first of one time.
+fn leave_out_repeated(vehicles: &mut [RawVehicle], about: &mut Understanding) {
+    let (mut rows, mut repeated, mut conflicts) = (0, 0, 0);
+    for vehicle in vehicles {
+        rows += vehicle.samples.len() as u64;
+        if vehicle.samples.steps().all(|step| step > 0.0) {
+            continue;
+        }
+        let mut samples = vehicle.samples.to_vec();
+        samples.sort_by(|a, b| a[AT].total_cmp(&b[AT]));
+        let count = samples.len();
+        samples.dedup_by(|later, first| {
+            let is_repeated = later[AT] == first[AT];
+            let apart_m = (later[X] - first[X]).abs().max((later[Y] - first[Y]).abs());
+            conflicts += u64::from(is_repeated && apart_m > SAME_PLACE_M);
+            is_repeated
+        });
+        repeated += (count - samples.len()) as u64;
+        vehicle.samples = samples.iter().collect();
+    }
+    about.warn_of(repeated, "rows repeat vehicle and time of another row and are left out");
+    let what = "of these rows name another position; the first row counts: check `vehicle` and `time`";
+    about.find_of(conflicts, 100 * conflicts > rows, what);
+}
+
+/// From the frames or times of a file to the frames of the recording.
+struct Clock {
+    rate_hz: f64,
+    /// The first time of the file, and its frame.
+    origin: f64,
+    first_frame: f64,
+    /// Frames as recorded per unit of the file's times.
+    scale: f64,
+    /// Frames of the recording per frame as recorded.
+    factor: f64,
+}
+
+impl Clock {
+    fn of(
+        raw: &RawRecording,
+        preset: &Preset,
+        about: &mut Understanding,
+        bad: &dyn Fn(&str, &str) -> Error,
+    ) -> Result<Clock> {
+        let mut steps: Vec<f64> = raw.vehicles.iter().flat_map(|vehicle| vehicle.samples.steps()).collect();
+        if steps.is_empty() {
+            return Err(bad("no vehicle has two samples", "check the columns for vehicle and time"));
+        }
+        let step = median(&mut steps);
+        let origin = raw.vehicles.iter().map(|vehicle| vehicle.samples.of(AT, 0)).fold(f64::INFINITY, f64::min);
+        let (source, rate_hz, scale, first) = if raw.has_frames {
+            let rate_hz = raw.frame_rate_hz.or(preset.frame_rate_hz).ok_or_else(|| {
+                bad("the frame rate is unknown", "set `frame_rate_hz` in the preset, or name a column for `time`")
+            })?;
+            let source = if raw.frame_rate_hz.is_some() { "meta file" } else { "preset" };
+            let stride = step.round().max(1.0);
+            (source, rate_hz / stride, 1.0 / stride, origin / stride)
+        } else {
+            let rate_hz = rate_of_times(raw, step);
+            about.seen.rate_is_of_times = true;
+            if let Some(said) = preset.frame_rate_hz.filter(|said| (said / rate_hz - 1.0).abs() > 0.02) {
+                about.refuse(format!("the times have {rate_hz:.2} frames per second, the preset says {said}"));
+            }
+            ("times", rate_hz, rate_hz, if origin.abs() < 1e6 { origin * rate_hz } else { 0.0 })
+        };
+        if !(0.1..=1e4).contains(&rate_hz) {
+            return Err(bad(
+                &format!("{rate_hz} frames per second: the times or the frame rate are wrong"),
+                "check the unit of `time` (s, ms, us, ns, date), or `frame_rate_hz`",
+            ));
+        }
+        let factor = preset.resample_hz.map_or(1.0, |wanted| wanted / rate_hz);
+        let rate_hz = rate_hz * factor;
+        about.fact("rate", format!("{} Hz, from the {source}", value(rate_hz)));
+        Ok(Clock { rate_hz, origin, first_frame: first.round() * factor, scale, factor })
+    }
+
+    fn frame(&self, at: f64) -> f64 {
+        self.first_frame + (at - self.origin) * self.scale * self.factor
+    }
+}
+
 /// By how much each step of a vehicle differs from what the step before it and the one after it tell, whichever is closer, less
 /// what an acceleration explains, m. What lies to the side counts for less.
-fn step_differences_m(samples: &[RawSample], time_s: impl Fn(f64) -> f64) -> Vec<f64> {
+fn step_differences_m(samples: &[Sample], clock: &Clock) -> Vec<f64> {
     let (Some(first), Some(last)) = (samples.first(), samples.last()) else { return Vec::new() };
-    let minus = |a: [f64; 2], b: [f64; 2]| [a[0] - b[0], a[1] - b[1]];
-    let steps: Vec<([f64; 2], f64)> = samples
-        .windows(2)
-        .map(|pair| (minus(pair[1].xy_m, pair[0].xy_m), time_s(pair[1].at) - time_s(pair[0].at)))
-        .collect();
-    let overall = unit(minus(last.xy_m, first.xy_m));
+    let minus = |a: &Sample, b: &Sample| [a[X] - b[X], a[Y] - b[Y]];
+    let time_s = |sample: &Sample| clock.frame(sample[AT]) / clock.rate_hz;
+    let steps: Vec<([f64; 2], f64)> =
+        samples.windows(2).map(|pair| (minus(&pair[1], &pair[0]), time_s(&pair[1]) - time_s(&pair[0]))).collect();
+    let overall = unit(minus(last, first));
     let difference_m = |k: usize, beside: usize| {
         let ((by, dt_s), (other, other_s)) = (steps[k], steps[beside]);
         let scale = dt_s / other_s;
-        let off = minus(by, [scale * other[0], scale * other[1]]);
+        let off = [by[0] - scale * other[0], by[1] - scale * other[1]];
         // A slow step has no direction.
         let is_slow = libm::hypot(other[0], other[1]) < other_s;
         let along = unit(other).filter(|_| !is_slow).or(overall).unwrap_or([1.0, 0.0]);
@@ -207,7 +225,7 @@ fn rate_of_times(raw: &RawRecording, step: f64) -> f64 {
 }
 
 /// The samples at whole frames: as they are, or by linear interpolation.
-fn at_frames<'a>(piece: &'a [RawSample], frames: &[f64], about: &mut Understanding) -> (Cow<'a, [RawSample]>, i64) {
+fn at_frames<'a>(piece: &'a [Sample], frames: &[f64]) -> (Cow<'a, [Sample]>, i64) {
     let first = frames[0].round();
     let is_on = |(k, frame): (usize, &f64)| (frame - first - k as f64).abs() <= OFF_RASTER;
     if frames.iter().enumerate().all(is_on) {
@@ -224,11 +242,8 @@ fn at_frames<'a>(piece: &'a [RawSample], frames: &[f64], about: &mut Understandi
         }
         let (a, b) = (k, (k + 1).min(frames.len() - 1));
         let part = if b > a { ((frame - frames[a]) / (frames[b] - frames[a])).clamp(0.0, 1.0) } else { 0.0 };
-        samples.push(RawSample::between(&piece[a], &piece[b], part));
+        samples.push(between(&piece[a], &piece[b], part));
         frame += 1.0;
     }
-    let off = |frame: &f64| (frame - frame.round()).abs();
-    about.interpolated += samples.len() as u64;
-    about.off_raster_frames = frames.iter().map(off).fold(about.off_raster_frames, f64::max);
     (samples.into(), first as i64)
 }

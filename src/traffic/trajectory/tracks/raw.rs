@@ -2,52 +2,25 @@
 
 use std::collections::HashMap;
 
+use super::TrackFile;
 use super::apart::apart;
-use super::preset::{HeadingOrigin, MetaFile, Preset, Side};
+use super::preset::{Axes, HeadingOrigin, MetaFile, Preset};
 use super::roles::{ColumnName, Role};
-use super::rows::{Columns, Rows, SampleRow, TIME_OF_DAY};
-use super::samples::Samples;
-use super::{TrackFile, sumo};
+use super::rows::{Columns, Rows, SampleRow};
+use super::samples::{
+    AT, CLASS, DIRECTION, HEADING_X, HEADING_Y, LANE, LANE_OFFSET, LENGTH, OTHER_CLOCK, SPEED, Samples, UNKNOWN, WIDTH,
+    X, Y, Y_ACCELERATION, Y_SPEED, number,
+};
+use super::times::TIME_OF_DAY;
 use crate::support::input_file::packed_or_not;
 use crate::support::plain_text::nearest;
 use crate::traffic::trajectory::csv_table::FileChecksum;
 use crate::{Error, Place, Result};
 
-/// No lane is named.
-pub(super) const NO_LABEL: u32 = u32::MAX;
-/// Maximum number of lane names of a file; more are no names of lanes.
-const MAX_LABELS: usize = 65_536;
+/// Maximum number of names of lanes, and of classes, of a recording; more are none.
+const MAX_NAMES: usize = 65_536;
 /// Times of day that fall by more begin again at midnight, s.
 const HALF_A_DAY_S: f64 = 43_200.0;
-
-/// One sample. NaN: not in the file.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct RawSample {
-    /// Frame number, or time in s.
-    pub at: f64,
-    /// Position of the reference point, m; y to the left of x.
-    pub xy_m: [f64; 2],
-    /// Direction of the vehicle's front.
-    pub heading: [f64; 2],
-    /// Magnitude of the velocity, m/s.
-    pub speed_mps: f64,
-    /// Velocity in the axes of the file, m/s.
-    pub velocity_mps: [f64; 2],
-    /// Velocity forward and to the left along the road, m/s.
-    pub along_mps: [f64; 2],
-    /// Acceleration forward, m/s².
-    pub acceleration_mps2: f64,
-    /// Acceleration in the axes of the file, m/s².
-    pub acceleration_xy_mps2: [f64; 2],
-    /// Index of the lane's name, or [`NO_LABEL`].
-    pub lane: u32,
-    /// Distance from the middle of the lane, m.
-    pub lane_offset_m: f64,
-    /// The time, s, where `at` counts frames; the frame where it is a time.
-    pub other_clock: f64,
-    /// Length, width, class and direction in its row: index in the lists of the vehicle + 1, or 0.
-    pub facts: [u16; 4],
-}
 
 /// One vehicle.
 #[derive(Debug, Clone, Default)]
@@ -55,74 +28,45 @@ pub(super) struct RawVehicle {
     /// Its id in the file.
     pub key: String,
     pub class: Option<String>,
-    /// The classes in its rows; each change is one more.
-    pub classes: Vec<String>,
     /// The lengths and widths that it has, m; each change is one more.
-    pub lengths_m: Vec<f64>,
-    pub widths_m: Vec<f64>,
+    pub sizes_m: [Vec<f64>; 2],
     /// Sign of the travel along the road.
     pub direction: Option<f64>,
     pub samples: Samples,
 }
 
-/// Adds a value to a list of changes; returns its index + 1.
-fn changed<T, V: PartialEq<T> + Into<T>>(list: &mut Vec<T>, value: V) -> u16 {
-    if list.last().is_none_or(|last| value != *last) {
-        list.push(value.into());
-    }
-    u16::try_from(list.len()).unwrap_or(u16::MAX)
-}
-
-/// The value of a list of changes that a row has.
-fn in_row<T: Clone>(list: &[T], fact: u16) -> Option<T> {
-    list.get(usize::from(fact).checked_sub(1)?).cloned()
-}
-
 impl RawVehicle {
+    /// A vehicle with the sizes, and the class and direction of its first row.
+    fn of_rows(key: String, samples: Samples, classes: &[String]) -> RawVehicle {
+        let class = class_of_first(&samples, classes).cloned();
+        let direction = Some(samples.of(DIRECTION, 0)).filter(|sign| !sign.is_nan());
+        let sizes_m = [LENGTH, WIDTH].map(|column| samples.changes(column));
+        RawVehicle { key, class, sizes_m, direction, samples }
+    }
+
     /// Lengths and widths of some of its samples, m; all of them if these have none in their rows.
     pub(super) fn sizes_m(&self, samples: &Samples) -> [Vec<f64>; 2] {
-        let of = |fact: usize, list: &[f64]| {
-            let in_rows = || (0..samples.len()).filter_map(|k| in_row(list, samples.fact(fact, k)));
-            let mut sizes: Vec<f64> = if list.len() > 1 { in_rows().collect() } else { Vec::new() };
-            sizes.dedup();
-            if sizes.is_empty() { list.to_vec() } else { sizes }
-        };
-        [of(0, &self.lengths_m), of(1, &self.widths_m)]
+        std::array::from_fn(|at| {
+            let all = &self.sizes_m[at];
+            let own = if all.len() > 1 { samples.changes([LENGTH, WIDTH][at]) } else { Vec::new() };
+            if own.is_empty() { all.clone() } else { own }
+        })
     }
 
-    /// Class of some of its samples: that in the row of the first, unless a type or a meta file gives another name.
-    pub(super) fn class_of(&self, samples: &Samples) -> Option<String> {
-        let in_rows = self.classes.len() > 1
-            && !samples.is_empty()
-            && self.classes.iter().any(|of| Some(of) == self.class.as_ref());
-        let class = if in_rows { in_row(&self.classes, samples.fact(2, 0)) } else { None };
-        class.or_else(|| self.class.clone())
+    /// Class of some of its samples: that of the first.
+    pub(super) fn class_of<'a>(&'a self, samples: &Samples, classes: &'a [String]) -> &'a str {
+        class_of_first(samples, classes).or(self.class.as_ref()).map_or("", String::as_str)
     }
 
-    /// Some of its samples as a vehicle of their own, with the sizes, class and direction in their rows.
-    pub(super) fn part(&self, samples: Samples) -> RawVehicle {
-        let [lengths_m, widths_m] = self.sizes_m(&samples);
-        let first = |fact: usize| if samples.is_empty() { 0 } else { samples.fact(fact, 0) };
-        let (class, direction) = (in_row(&self.classes, first(2)), in_row(&[-1.0, 1.0], first(3)));
-        RawVehicle {
-            key: self.key.clone(),
-            class,
-            classes: self.classes.clone(),
-            lengths_m,
-            widths_m,
-            direction,
-            samples,
-        }
+    /// Some of its samples as a vehicle of their own.
+    pub(super) fn part(&self, samples: Samples, classes: &[String]) -> RawVehicle {
+        let sizes_m = self.sizes_m(&samples);
+        RawVehicle { sizes_m, ..RawVehicle::of_rows(self.key.clone(), samples, classes) }
     }
+}
 
-    /// Takes the sizes that it lacks from another source.
-    pub(super) fn complete_sizes(&mut self, known: &RawVehicle) {
-        for (own, known) in [(&mut self.lengths_m, &known.lengths_m), (&mut self.widths_m, &known.widths_m)] {
-            if own.is_empty() {
-                own.clone_from(known);
-            }
-        }
-    }
+fn class_of_first<'a>(samples: &Samples, classes: &'a [String]) -> Option<&'a String> {
+    classes.get(number(samples.of(CLASS, 0))? as usize)
 }
 
 /// One recording.
@@ -132,24 +76,21 @@ pub(super) struct RawRecording {
     pub vehicles: Vec<RawVehicle>,
     /// Names of lanes.
     pub lanes: Vec<String>,
-    /// Whether `at` counts frames.
+    /// Names of classes.
+    pub classes: Vec<String>,
+    /// Whether times are frames.
     pub has_frames: bool,
     pub frame_rate_hz: Option<f64>,
     /// Samples without a position.
     pub incomplete: u64,
-    /// Lines of the lanes, from a map: points in the axes of the file, by boundary.
-    pub boundaries: Vec<Vec<[f64; 2]>>,
     pub synthetic: bool,
     /// What was assumed of it.
     pub notes: Vec<String>,
 }
 
-/// The recordings of a file.
-#[derive(Debug)]
-pub(super) struct RawFile {
-    pub recordings: Vec<RawRecording>,
+/// A file, and its meta files.
+pub(super) struct FileFacts {
     pub checksums: Vec<FileChecksum>,
-    pub rows: u64,
     /// Roles that the file has, with their columns.
     pub roles: Vec<(Role, String)>,
     /// Columns without a role.
@@ -160,275 +101,195 @@ pub(super) struct RawFile {
 ///
 /// # Errors
 /// Those of the files, with the place of a bad value.
-pub(super) fn read_table(file: &TrackFile, preset: &Preset) -> Result<RawFile> {
-    let rows = Rows::of_preset(&file.path, preset)?;
-    let columns = Columns::of(&preset.columns, rows.header(), &preset.none);
+pub(super) fn read_table(file: &TrackFile, preset: &Preset) -> Result<(Vec<RawRecording>, FileFacts)> {
+    let rows = Rows::open(&file.path)?;
+    let mut columns = Columns::of(&preset.columns, rows.header(), &preset.none);
     check_columns(&rows, &columns, preset)?;
-    let mut roles: Vec<(Role, String)> = Role::ALL
-        .into_iter()
-        .filter(|role| columns.has(*role))
-        .map(|role| (role, columns.name(role).to_owned()))
-        .collect();
+    let present = Role::ALL.into_iter().filter(|role| columns.has(*role));
+    let mut roles: Vec<(Role, String)> = present.map(|role| (role, columns.name(role).to_owned())).collect();
     let is_used = |name: &&String| roles.iter().any(|(_, used)| used == *name);
     let unused = rows.header().iter().filter(|name| !is_used(name)).cloned().collect();
-    let mut collecting = Collecting::new(&file.id, preset, &columns);
-    let (checksum, count) = rows.each(&columns, &mut |row| collecting.add(row))?;
+    // Times tell the rate too.
+    let has_frames = columns.has(Role::Frame)
+        && (preset.frame_rate_hz.is_some() || preset.recording.is_some() || !columns.has(Role::Time));
+    let mut collecting = Collecting { axes: preset.axes, id: file.id.clone(), has_frames, ..Collecting::default() };
+    let checksum = rows.each(&mut columns, |row| collecting.add(row))?;
     let mut recordings = collecting.recordings;
     recordings.retain(|recording| !recording.vehicles.is_empty());
     if let Some(found) = columns.found_time() {
         roles.iter_mut().filter(|(role, _)| *role == Role::Time).for_each(|(_, name)| *name += &format!(" ({found})"));
     }
-    recordings.iter_mut().flat_map(|of| &mut of.vehicles).for_each(|vehicle| vehicle.samples.shrink());
+    for RawRecording { vehicles, classes, .. } in &mut recordings {
+        for vehicle in vehicles {
+            let RawVehicle { key, mut samples, .. } = std::mem::take(vehicle);
+            samples.shrink();
+            *vehicle = RawVehicle::of_rows(key, samples, classes);
+        }
+    }
     let mut checksums = vec![checksum];
     checksums.extend(add_frame_rate(file, preset, &mut recordings)?);
     let mut recordings = apart(recordings, preset);
     checksums.extend(add_vehicle_facts(file, preset, &mut recordings)?);
-    if let Some(patterns) = &preset.types_file {
-        checksums.extend(sumo::add_facts(file, patterns.names(), preset, &mut recordings)?);
-    }
-    Ok(RawFile { recordings, checksums, rows: count, roles, unused })
+    Ok((recordings, FileFacts { checksums, roles, unused }))
 }
 
 fn check_columns(rows: &Rows, columns: &Columns, preset: &Preset) -> Result<()> {
-    if let Some(role) =
-        [Role::X, Role::Y].into_iter().find(|role| columns.has(*role) && is_geographic(columns.name(*role)))
-    {
-        let problem = "the column is a longitude or latitude; positions are in metres in a plane";
-        return Err(Error::input(rows.header_place().column(columns.name(role)), problem, PROJECT));
-    }
     let is_needed = |role: Role, column: &ColumnName| match role {
         Role::Vehicle | Role::X | Role::Y => true,
         Role::Frame => !columns.has(Role::Time),
         Role::Time => !columns.has(Role::Frame),
+        Role::Length | Role::Width if preset.sizes_from.is_some() => true,
         // The names of a shipped preset may be absent in older files, and of several names the user knows that too.
         _ => preset.is_own && column.names().len() == 1,
     };
     let missing = preset.columns.iter().find(|(role, column)| !columns.has(**role) && is_needed(**role, column));
     let Some((role, column)) = missing else { return Ok(()) };
-    let header: Vec<String> = rows.header().iter().take(30).map(|name| format!("`{name}`")).collect();
     let near = column.names().first().and_then(|name| nearest(name, rows.header().iter().map(String::as_str), 0.6));
     let near = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-    Err(Error::input(
-        rows.header_place(),
-        format!(
-            "preset {} takes `{}` from the column `{}`, which is not there{near}; the header has {}",
-            preset.name,
-            role.key(),
-            column.names().join("` or `"),
-            header.join(", ")
-        ),
-        "correct the name in the preset, or remove the line; or use another preset",
-    ))
+    let (name, key, names) = (&preset.name, role.key(), column.names().join("` or `"));
+    let problem = format!("preset {name} takes `{key}` from the column `{names}`, which is not there{near}");
+    let help = match &preset.sizes_from {
+        Some(code) => format!("make a table with it in Python: {code}"),
+        None => "correct the name in the preset, or remove the line; or use another preset".to_owned(),
+    };
+    Err(Error::input(rows.header_place(), problem, help))
 }
 
-struct Collecting<'a> {
-    preset: &'a Preset,
-    columns: &'a Columns,
-    id: &'a str,
+/// Numbers that a sample takes from its row as they are, in the order of its columns from [`SPEED`] on.
+#[rustfmt::skip]
+const NUMBERS: [Role; 8] = [
+    Role::Speed, Role::XSpeed, Role::YSpeed, Role::ForwardSpeed, Role::LeftwardSpeed, Role::Acceleration, Role::XAcceleration,
+    Role::YAcceleration,
+];
+
+#[derive(Default)]
+struct Collecting {
+    axes: Axes,
+    /// Name of the file's recording, before names in it.
+    id: String,
+    /// Times are frames.
+    has_frames: bool,
     recordings: Vec<RawRecording>,
     /// By the name of the recording in the file.
     of_name: HashMap<String, usize>,
-    vehicles: HashMap<(usize, String), usize>,
-    labels: HashMap<(usize, String), u32>,
-    last: (usize, usize),
-    /// By recording, the vehicle that came after each vehicle: it often does so again at the next time.
-    next: Vec<Vec<usize>>,
-    has_frames: bool,
-    other_clock: Role,
-    y_sign: f64,
+    /// By recording and id in the file.
+    vehicles: Vec<HashMap<String, usize>>,
+    /// Numbers of the names of lanes and classes, by recording.
+    names: HashMap<(usize, Role, String), usize>,
 }
 
-impl<'a> Collecting<'a> {
-    fn new(id: &'a str, preset: &'a Preset, columns: &'a Columns) -> Self {
-        // Times tell the rate too.
-        let has_frames = columns.has(Role::Frame)
-            && (preset.frame_rate_hz.is_some() || preset.recording.is_some() || !columns.has(Role::Time));
-        Collecting {
-            preset,
-            columns,
-            id,
-            recordings: Vec::new(),
-            of_name: HashMap::new(),
-            vehicles: HashMap::new(),
-            labels: HashMap::new(),
-            last: (usize::MAX, usize::MAX),
-            next: Vec::new(),
-            has_frames,
-            other_clock: if has_frames { Role::Time } else { Role::Frame },
-            y_sign: if preset.axes.y == Side::Right { -1.0 } else { 1.0 },
-        }
-    }
-
-    fn add(&mut self, row: &dyn SampleRow) -> Result<()> {
+impl Collecting {
+    fn add(&mut self, row: &SampleRow) -> Result<()> {
         let missing = |role: Role| Error::input(row.place(role), "there is no value", "fill it in, or remove the row");
-        let recording = self.recording(row)?;
-        let vehicle = match self.expected_vehicle(recording, row)? {
-            Some(vehicle) => vehicle,
-            None => match row.text(Role::Vehicle)? {
-                Some(key) => self.vehicle(recording, &key),
-                // Tables of time steps have a row for a step without vehicles.
-                None if row.number(Role::X)?.is_none() && row.number(Role::Y)?.is_none() => return Ok(()),
-                None => return Err(missing(Role::Vehicle)),
-            },
+        let recording = self.recording(row);
+        let vehicle = match row.text(Role::Vehicle) {
+            Some(key) => self.vehicle(recording, &key),
+            // Tables of time steps have a row for a step without vehicles.
+            None if row.number(Role::X)?.is_none() && row.number(Role::Y)?.is_none() => return Ok(()),
+            None => return Err(missing(Role::Vehicle)),
         };
-        let time = if self.has_frames { Role::Frame } else { Role::Time };
-        let at = row.number(time)?.ok_or_else(|| missing(time))?;
+        let [clock, other_clock] = if self.has_frames { [Role::Frame, Role::Time] } else { [Role::Time, Role::Frame] };
+        let y_sign = self.axes.y_sign();
         let number = |role| row.number(role).map(|value| value.unwrap_or(f64::NAN));
-        let xy_m = [number(Role::X)?, self.y_sign * number(Role::Y)?];
-        if xy_m.iter().any(|value| value.is_nan()) {
+        let mut sample = UNKNOWN;
+        sample[AT] = row.number(clock)?.ok_or_else(|| missing(clock))?;
+        (sample[X], sample[Y]) = (number(Role::X)?, y_sign * number(Role::Y)?);
+        if sample[X].is_nan() || sample[Y].is_nan() {
             self.recordings[recording].incomplete += 1;
             return Ok(());
         }
-        let heading = match row.number(Role::Heading)? {
-            None => [f64::NAN; 2],
-            Some(angle) => {
-                let (sin, cos) = (libm::sin(angle), libm::cos(angle));
-                match self.preset.axes.heading {
-                    HeadingOrigin::FromX => [cos, self.y_sign * sin],
-                    HeadingOrigin::FromNorth => [sin, self.y_sign * cos],
-                }
-            }
-        };
-        let mut sample = RawSample {
-            at,
-            xy_m,
-            heading,
-            speed_mps: number(Role::Speed)?,
-            velocity_mps: [number(Role::XSpeed)?, self.y_sign * number(Role::YSpeed)?],
-            along_mps: [number(Role::ForwardSpeed)?, number(Role::LeftwardSpeed)?],
-            acceleration_mps2: number(Role::Acceleration)?,
-            acceleration_xy_mps2: [number(Role::XAcceleration)?, self.y_sign * number(Role::YAcceleration)?],
-            lane_offset_m: number(Role::LaneOffset)?,
-            // Only numbers of the file are compared with one another: a text counts as no value.
-            other_clock: row.number(self.other_clock).ok().flatten().unwrap_or(f64::NAN),
-            ..RawSample::unknown()
-        };
-        let of = &self.recordings[recording];
-        let before = &of.vehicles[vehicle].samples;
-        let lane_before = before.len().checked_sub(1).map_or(NO_LABEL, |last| before.lane(last));
-        if lane_before != NO_LABEL && row.is_text(Role::Lane, &of.lanes[lane_before as usize])? {
-            sample.lane = lane_before;
-        } else if let Some(lane) = row.text(Role::Lane)? {
-            sample.lane = self.label(recording, &lane);
+        if let Some(angle) = row.number(Role::Heading)? {
+            let (sin, cos) = (libm::sin(angle), libm::cos(angle));
+            (sample[HEADING_X], sample[HEADING_Y]) = match self.axes.heading {
+                HeadingOrigin::FromX => (cos, y_sign * sin),
+                HeadingOrigin::FromNorth => (sin, y_sign * cos),
+            };
         }
+        for (column, role) in (SPEED..).zip(NUMBERS) {
+            sample[column] = number(role)?;
+        }
+        sample[LANE_OFFSET] = number(Role::LaneOffset)?;
+        sample[Y_SPEED] *= y_sign;
+        sample[Y_ACCELERATION] *= y_sign;
+        // Only numbers of the file are compared with one another: a text counts as no value.
+        sample[OTHER_CLOCK] = row.number(other_clock).ok().flatten().unwrap_or(f64::NAN);
+        for (column, role) in [(LENGTH, Role::Length), (WIDTH, Role::Width)] {
+            sample[column] = row.number(role)?.filter(|size| *size > 0.0).unwrap_or(f64::NAN);
+        }
+        sample[LANE] = self.name(row, Role::Lane, LANE, (recording, vehicle));
+        sample[CLASS] = self.name(row, Role::Class, CLASS, (recording, vehicle));
+        sample[DIRECTION] = number(Role::Direction)?;
         let of = &mut self.recordings[recording].vehicles[vehicle];
-        if let Some(last) = of.samples.len().checked_sub(1)
-            && self.columns.found_time() == Some(TIME_OF_DAY)
-            && of.samples.at(last) - at > HALF_A_DAY_S
+        if row.columns.found_time() == Some(TIME_OF_DAY)
+            && of.samples.len().checked_sub(1).is_some_and(|last| of.samples.of(AT, last) - sample[AT] > HALF_A_DAY_S)
         {
             let problem = "the times of day of this vehicle begin again: the recording goes past midnight";
             let help = "write dates (2024-10-07 00:00:00.05), or seconds";
-            return Err(Error::input(row.place(time).of(format!("vehicle {}", of.key)), problem, help));
-        }
-        for (fact, role, sizes) in [(0, Role::Length, &mut of.lengths_m), (1, Role::Width, &mut of.widths_m)] {
-            if let Some(size) = row.number(role)?.filter(|size| *size > 0.0) {
-                sample.facts[fact] = changed(sizes, size);
-            }
-        }
-        let is_same_class = of.classes.last().map(|class| row.is_text(Role::Class, class)).transpose()?;
-        sample.facts[2] = match is_same_class {
-            Some(true) => u16::try_from(of.classes.len()).unwrap_or(u16::MAX),
-            _ => row.text(Role::Class)?.map_or(0, |class| changed(&mut of.classes, class.as_ref())),
-        };
-        let direction = row.number(Role::Direction)?;
-        sample.facts[3] = direction.map_or(0, |sign| 1 + u16::from(sign >= 0.0));
-        if of.samples.is_empty() {
-            of.class = in_row(&of.classes, sample.facts[2]);
-            of.direction = direction;
+            return Err(Error::input(row.place(clock).of(format!("vehicle {}", of.key)), problem, help));
         }
         of.samples.push(&sample);
         Ok(())
     }
 
-    fn recording(&mut self, row: &dyn SampleRow) -> Result<usize> {
-        let name = row.text(Role::Recording)?.unwrap_or_default();
+    fn recording(&mut self, row: &SampleRow) -> usize {
+        let name = row.text(Role::Recording).unwrap_or_default();
         if let Some(&at) = self.of_name.get(name.as_ref()) {
-            return Ok(at);
+            return at;
         }
-        let id = if name.is_empty() { self.id.to_owned() } else { format!("{}-{name}", self.id) };
-        let plain = id.replace(['/', '\\', ' '], "-");
-        let is_new = |id: &String| self.recordings.iter().all(|other| other.id != *id);
-        // `a b` and `a/b` stay apart.
-        let numbered = (2..).map(|number| format!("{plain}-{number}"));
-        let id = std::iter::once(plain.clone()).chain(numbered).find(is_new).unwrap_or_default();
+        let id = if name.is_empty() { self.id.clone() } else { format!("{}-{name}", self.id) };
+        let id = id.replace(['/', '\\', ' '], "-");
         self.recordings.push(RawRecording { id, has_frames: self.has_frames, ..RawRecording::default() });
-        self.next.push(Vec::new());
+        self.vehicles.push(HashMap::new());
         self.of_name.insert(name.into_owned(), self.recordings.len() - 1);
-        Ok(self.recordings.len() - 1)
-    }
-
-    /// The vehicle of a row, if it is that of the last row or the one that came after it before.
-    fn expected_vehicle(&mut self, recording: usize, row: &dyn SampleRow) -> Result<Option<usize>> {
-        if self.last.0 != recording {
-            return Ok(None);
-        }
-        let vehicles = &self.recordings[recording].vehicles;
-        for vehicle in [self.last.1, self.next[recording][self.last.1]] {
-            if row.is_text(Role::Vehicle, &vehicles[vehicle].key)? {
-                self.last.1 = vehicle;
-                return Ok(Some(vehicle));
-            }
-        }
-        Ok(None)
+        self.recordings.len() - 1
     }
 
     fn vehicle(&mut self, recording: usize, key: &str) -> usize {
+        if let Some(&at) = self.vehicles[recording].get(key) {
+            return at;
+        }
+        let of = &mut self.recordings[recording].vehicles;
+        of.push(RawVehicle { key: key.to_owned(), ..RawVehicle::default() });
+        self.vehicles[recording].insert(key.to_owned(), of.len() - 1);
+        of.len() - 1
+    }
+
+    /// The number of the name of a lane or class, often that of the vehicle's last row.
+    fn name(&mut self, row: &SampleRow, role: Role, column: usize, (recording, vehicle): (usize, usize)) -> f64 {
         let of = &mut self.recordings[recording];
-        let next = &mut self.next[recording];
-        let at = *self.vehicles.entry((recording, key.to_owned())).or_insert_with(|| {
-            of.vehicles.push(RawVehicle { key: key.to_owned(), ..RawVehicle::default() });
-            next.push(of.vehicles.len() - 1);
-            of.vehicles.len() - 1
+        let list = if role == Role::Lane { &mut of.lanes } else { &mut of.classes };
+        let samples = &of.vehicles[vehicle].samples;
+        let last = samples.len().checked_sub(1).map_or(f64::NAN, |last| samples.of(column, last));
+        if number(last).is_some_and(|last| row.is_text(role, &list[last as usize])) {
+            return last;
+        }
+        let Some(text) = row.text(role) else { return f64::NAN };
+        let at = *self.names.entry((recording, role, text.into_owned())).or_insert_with_key(|(.., text)| {
+            if list.len() < MAX_NAMES {
+                list.push(text.clone());
+                return list.len() - 1;
+            }
+            MAX_NAMES
         });
-        if self.last.0 == recording {
-            next[self.last.1] = at;
-        }
-        self.last = (recording, at);
-        at
-    }
-
-    fn label(&mut self, recording: usize, lane: &str) -> u32 {
-        let of = &mut self.recordings[recording];
-        if let Some(last) = of.lanes.last().filter(|last| *last == lane) {
-            debug_assert!(!last.is_empty());
-            return of.lanes.len() as u32 - 1;
-        }
-        if let Some(&label) = self.labels.get(&(recording, lane.to_owned())) {
-            return label;
-        }
-        if of.lanes.len() >= MAX_LABELS {
-            return NO_LABEL;
-        }
-        of.lanes.push(lane.to_owned());
-        let label = of.lanes.len() as u32 - 1;
-        self.labels.insert((recording, lane.to_owned()), label);
-        label
+        if at < MAX_NAMES { at as f64 } else { f64::NAN }
     }
 }
 
-/// What to do with geographic coordinates.
-pub(in crate::traffic::trajectory) const PROJECT: &str =
-    "project the positions to metres (UTM, for instance) and name the columns x and y";
-
-/// Whether a name is that of a column of longitudes or latitudes.
-pub(in crate::traffic::trajectory) fn is_geographic(name: &str) -> bool {
-    let bare = name.split(['(', '[']).next().unwrap_or(name);
-    let letters: String = bare.chars().filter(|c| c.is_alphabetic()).flat_map(char::to_lowercase).collect();
-    let letters = letters.trim_start_matches("gps").trim_end_matches("deg");
-    ["lon", "lng", "long", "longitude", "lat", "latitude"].contains(&letters)
-}
-
-/// The meta file beside a track file, if it is there.
-fn meta_rows(file: &TrackFile, meta: &MetaFile, preset: &Preset) -> Result<Option<(Rows, Columns)>> {
+/// Gives the rows of a meta file beside a track file to `each`. Returns its checksum.
+fn read_meta(
+    file: &TrackFile,
+    meta: &MetaFile,
+    preset: &Preset,
+    each: impl FnMut(&SampleRow) -> Result<()>,
+) -> Result<FileChecksum> {
     let beside = packed_or_not(file.path.with_file_name(meta.file.replace('*', &file.id)));
     if !beside.exists() {
         let problem = format!("preset {} names this file, which is not there", preset.name);
-        let missing = || Error::input(Place::file(&beside), problem, "add it, or remove its table from the preset");
-        return if preset.is_own { Err(missing()) } else { Ok(None) };
+        return Err(Error::input(Place::file(&beside), problem, "add it, or use a preset without it"));
     }
-    let rows = Rows::open(&beside, preset.format, None, preset.delimiter)?;
-    let columns = Columns::of(&meta.columns, rows.header(), &preset.none);
-    Ok(Some((rows, columns)))
+    let rows = Rows::open(&beside)?;
+    let mut columns = Columns::of(&meta.columns, rows.header(), &preset.none);
+    rows.each(&mut columns, each)
 }
 
 /// Adds classes, sizes and directions of the vehicles from their own file.
@@ -438,24 +299,14 @@ fn add_vehicle_facts(
     recordings: &mut [RawRecording],
 ) -> Result<Option<FileChecksum>> {
     let Some(meta) = &preset.vehicles else { return Ok(None) };
-    let Some((rows, columns)) = meta_rows(file, meta, preset)? else {
-        let facts: Vec<&str> =
-            meta.columns.keys().filter(|role| **role != Role::Vehicle).map(|role| role.key()).collect();
-        let (file, facts) = (meta.file.replace('*', &file.id), facts.join(", "));
-        let note = format!("{file} is not beside the tracks: {facts} of the vehicles are not read from it");
-        recordings.iter_mut().for_each(|recording| recording.notes.push(note.clone()));
-        return Ok(None);
-    };
     let mut facts: HashMap<String, RawVehicle> = HashMap::new();
-    let (checksum, _) = rows.each(&columns, &mut |row| {
-        let Some(key) = row.text(Role::Vehicle)? else { return Ok(()) };
-        let sizes =
-            |role| -> Result<Vec<f64>> { Ok(row.number(role)?.filter(|size| *size > 0.0).into_iter().collect()) };
+    let checksum = read_meta(file, meta, preset, |row| {
+        let Some(key) = row.text(Role::Vehicle) else { return Ok(()) };
+        let size = |role| Ok(row.number(role)?.filter(|size| *size > 0.0).into_iter().collect());
         let vehicle = RawVehicle {
             key: key.to_string(),
-            class: row.text(Role::Class)?.map(|class| class.into_owned()),
-            lengths_m: sizes(Role::Length)?,
-            widths_m: sizes(Role::Width)?,
+            class: row.text(Role::Class).map(|class| class.into_owned()),
+            sizes_m: [size(Role::Length)?, size(Role::Width)?],
             direction: row.number(Role::Direction)?,
             ..RawVehicle::default()
         };
@@ -475,11 +326,15 @@ fn add_vehicle_facts(
             };
             vehicle.class = vehicle.class.take().or_else(|| known.class.clone());
             vehicle.direction = vehicle.direction.or(known.direction);
-            vehicle.complete_sizes(known);
+            for (own, known) in vehicle.sizes_m.iter_mut().zip(&known.sizes_m).filter(|(own, _)| own.is_empty()) {
+                own.clone_from(known);
+            }
         }
         if let Some(first) = unknown.first() {
-            let (number, file) = (unknown.len(), &checksum.file);
-            recording.notes.push(format!("{number} vehicles have no row in {file}, the first is vehicle {first}"));
+            let number = unknown.len();
+            recording
+                .notes
+                .push(format!("{number} vehicles have no row in {}, the first is vehicle {first}", checksum.file));
         }
     }
     Ok(Some(checksum))
@@ -488,16 +343,14 @@ fn add_vehicle_facts(
 /// Adds the frame rate from the file about the recording.
 fn add_frame_rate(file: &TrackFile, preset: &Preset, recordings: &mut [RawRecording]) -> Result<Option<FileChecksum>> {
     let Some(meta) = &preset.recording else { return Ok(None) };
-    let Some((rows, columns)) = meta_rows(file, meta, preset)? else { return Ok(None) };
     let mut rate = None;
-    let (checksum, _) = rows.each(&columns, &mut |row| {
-        if let Some(found) = row.number(Role::FrameRate)? {
-            if !(0.1..=1e4).contains(&found) {
-                let problem = format!("{found} is not a frame rate");
-                return Err(Error::input(row.place(Role::FrameRate), problem, "give the number of frames per second"));
-            }
-            rate = Some(found);
+    let checksum = read_meta(file, meta, preset, |row| {
+        let Some(found) = row.number(Role::FrameRate)? else { return Ok(()) };
+        if !(0.1..=1e4).contains(&found) {
+            let problem = format!("{found} is not a frame rate");
+            return Err(Error::input(row.place(Role::FrameRate), problem, "give the number of frames per second"));
         }
+        rate = Some(found);
         Ok(())
     })?;
     recordings.iter_mut().for_each(|recording| recording.frame_rate_hz = rate);

@@ -64,7 +64,7 @@ fn angle(a: [f64; 2]) -> f64 {
 }
 
 /// The median; NaN without values.
-pub(super) fn median(values: &mut [f64]) -> f64 {
+pub(in crate::traffic::trajectory) fn median(values: &mut [f64]) -> f64 {
     if values.is_empty() {
         return f64::NAN;
     }
@@ -122,17 +122,6 @@ impl RoadLine {
             return RoadLine::straight(self.points[0], reversed.tangents[0]);
         }
         reversed
-    }
-
-    /// Smallest radius of curvature over 50 m; infinite for a straight line.
-    pub(super) fn min_radius_m(&self) -> f64 {
-        let reach = (50.0 / STEP_M) as usize;
-        let turn = |i: usize| {
-            let (a, b) = (self.tangents[i], self.tangents[i + reach]);
-            libm::fabs(libm::atan2(cross(a, b), dot(a, b))) / (self.s_m[i + reach] - self.s_m[i])
-        };
-        let sharpest = (0..self.points.len().saturating_sub(reach)).map(turn).fold(0.0, f64::max);
-        if sharpest > 0.0 { 1.0 / sharpest } else { f64::INFINITY }
     }
 
     /// A point on the road.
@@ -219,7 +208,7 @@ fn path_length(path: &[[f64; 2]]) -> f64 {
     }
 }
 
-pub(super) fn d_range(on: &[OnRoad]) -> f64 {
+fn d_range(on: &[OnRoad]) -> f64 {
     let (low, high) = range(on.iter().map(|p| p.d_m));
     high - low
 }
@@ -454,7 +443,6 @@ mod tests {
         // Lane keepers wander by 0.4 m.
         let keepers: Vec<Path> = paths.iter().enumerate().filter(|(i, _)| i % 6 != 0).map(|(_, p)| p.clone()).collect();
         assert!(line.wander_m(&keepers) < 0.7, "{}", line.wander_m(&keepers));
-        assert!((line.min_radius_m() / 600.0 - 1.0).abs() < 0.25, "{}", line.min_radius_m());
         // s and d have no jumps, and d differs by the distance of the lanes.
         for path in &keepers {
             let on = line.project_all(path);
