@@ -5,6 +5,7 @@ use std::io::Write;
 use std::path::Path;
 
 use lanesweep::support::plausibility::Implausible;
+use lanesweep::traffic::mining::{MiningOptions, mine_folder};
 use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
 use lanesweep::traffic::trajectory::highd;
 use lanesweep::traffic::trajectory::tracks::{self, Preset, TrackFile};
@@ -99,15 +100,15 @@ fn compressed_and_utf_16_texts_are_read() {
 }
 
 #[test]
-fn a_compressed_file_beside_itself_is_read_once() {
+fn a_compressed_file_beside_itself_counts_once() {
     let dir = tempfile::tempdir().unwrap();
     let text = table().text();
     fs::write(dir.path().join("a.csv"), &text).unwrap();
     fs::write(dir.path().join("a.csv.gz"), packed(&text)).unwrap();
     fs::write(dir.path().join("b.csv.gz"), packed(&text)).unwrap();
-    let (files, problems) = Inputs::of(dir.path(), None).unwrap().files();
-    assert_eq!((files.len(), problems.len()), (2, 1));
-    assert!(problems[0].to_string().contains("a.csv.gz: the same file lies beside it"), "{}", problems[0]);
+    let mined = mine_folder(dir.path(), &MiningOptions::default(), Implausible::Refused, || Ok(())).unwrap();
+    assert_eq!((mined.recordings.len(), mined.problems.len()), (2, 1));
+    assert!(mined.problems[0].to_string().contains("recording a: another file"), "{:?}", mined.problems);
 }
 
 #[test]

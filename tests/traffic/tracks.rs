@@ -495,7 +495,7 @@ fn every_preset_reads_its_own_format_and_finds_mistakes_in_it() {
         let stride = 2;
         // The rate where only a meta file or the format says it.
         let rate = (!preset.columns.contains_key(&Role::Time)).then_some(12.5);
-        let preset = Preset { frame_rate_hz: rate, smoothing_s: None, recording: None, ..preset };
+        let preset = Preset { frame_rate_hz: rate, smoothing_s: None, vehicles: None, recording: None, ..preset };
         let understood = |mistake: Mistake| {
             let text = in_format_of(&preset, &recording, stride, mistake);
             match is_parquet {

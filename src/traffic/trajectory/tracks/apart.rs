@@ -32,6 +32,12 @@ pub(super) fn apart(recordings: Vec<RawRecording>, preset: &Preset) -> Vec<RawRe
     all
 }
 
+fn sorted(samples: &Samples, by: usize) -> Samples {
+    let mut samples = samples.to_vec();
+    samples.sort_by(|a, b| a[by].total_cmp(&b[by]));
+    samples.iter().collect()
+}
+
 /// The recordings of a file whose frames begin again, as NGSIM's do in each of three periods; `id-1`, `id-2`, ….
 fn periods(mut recording: RawRecording, rate_hz: f64) -> Vec<RawRecording> {
     // When its frame 0 would be.
@@ -45,9 +51,10 @@ fn periods(mut recording: RawRecording, rate_hz: f64) -> Vec<RawRecording> {
     }
     let mut zeros: Vec<f64> = zeros().collect();
     zeros.sort_by(f64::total_cmp);
+    recording.vehicles.iter_mut().for_each(|of| of.samples = sorted(&of.samples, OTHER_CLOCK));
     let steps = recording.vehicles.iter().flat_map(|of| (1..of.samples.len()).map(move |k| (&of.samples, k)));
     let by = |(samples, k): (&Samples, usize), column: usize| samples.of(column, k) - samples.of(column, k - 1);
-    let forward = steps.filter(|step| by(*step, OTHER_CLOCK) > 0.0 && by(*step, AT) > 0.0);
+    let forward = steps.filter(|step| by(*step, OTHER_CLOCK) > 0.0);
     let ratio = median(&mut forward.map(|step| by(step, OTHER_CLOCK) * rate_hz / by(step, AT)).collect::<Vec<_>>());
     if ratio.is_nan() || (ratio - 1.0).abs() > MAX_RATE_DIFFERENCE {
         let told = significant(rate_hz / ratio, 3);
@@ -90,9 +97,7 @@ fn part_returning(mut recording: RawRecording, per_s: f64, preset: &Preset) -> R
     let numbers = vehicles.len();
     for mut vehicle in vehicles {
         if vehicle.samples.steps().any(|step| step < 0.0) {
-            let mut samples = vehicle.samples.to_vec();
-            samples.sort_by(|a, b| a[AT].total_cmp(&b[AT]));
-            vehicle.samples = samples.iter().collect();
+            vehicle.samples = sorted(&vehicle.samples, AT);
         }
         let steps = vehicle.samples.steps().filter(|step| *step > 0.0);
         let pause = PAUSE_S.max(preset.max_gap_s) * per_s + 3.0 * steps.fold(f64::INFINITY, f64::min);

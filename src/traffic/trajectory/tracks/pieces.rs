@@ -44,11 +44,11 @@ pub(super) fn pieces(
 ) -> Result<(f64, Vec<Piece>)> {
     leave_out_repeated(&mut raw.vehicles, about);
     let bad = |problem: &str, help: &str| Error::input(place.clone(), problem, help);
-    let clock = Clock::of(raw, preset, about, &bad)?;
-    let Clock { rate_hz, factor, .. } = clock;
+    let (rate_hz, factor, frame) = clock(raw, preset, about, &bad)?;
+    let time_s = |at: f64| frame(at) / rate_hz;
     let max_gap = (preset.max_gap_s * rate_hz).max(1.0) + 0.5 + factor;
     let mut differences_m: Vec<f64> =
-        raw.vehicles.iter().flat_map(|of| step_differences_m(&of.samples.to_vec(), &clock)).collect();
+        raw.vehicles.iter().flat_map(|of| step_differences_m(&of.samples.to_vec(), time_s)).collect();
     let jump_m = JUMP_M.max(JUMP_OVER_NOISE * median(&mut differences_m));
     drop(differences_m);
     let vehicles = raw.vehicles.len();
@@ -59,8 +59,8 @@ pub(super) fn pieces(
     for (vehicle, of) in raw.vehicles.iter_mut().enumerate() {
         // From here on, pieces hold them.
         let samples = std::mem::take(&mut of.samples).to_vec();
-        let differences_m = step_differences_m(&samples, &clock);
-        let frames: Vec<f64> = samples.iter().map(|sample| clock.frame(sample[AT])).collect();
+        let differences_m = step_differences_m(&samples, time_s);
+        let frames: Vec<f64> = samples.iter().map(|sample| frame(sample[AT])).collect();
         let mut from = 0;
         for to in 1..=samples.len() {
             if to < samples.len() && frames[to] - frames[to - 1] <= max_gap {
@@ -128,71 +128,53 @@ fn leave_out_repeated(vehicles: &mut [RawVehicle], about: &mut Understanding) {
     about.find_of(conflicts, 100 * conflicts > rows, what);
 }
 
-/// From the frames or times of a file to the frames of the recording.
-struct Clock {
-    rate_hz: f64,
-    /// The first time of the file, and its frame.
-    origin: f64,
-    first_frame: f64,
-    /// Frames as recorded per unit of the file's times.
-    scale: f64,
-    /// Frames of the recording per frame as recorded.
-    factor: f64,
-}
-
-impl Clock {
-    fn of(
-        raw: &RawRecording,
-        preset: &Preset,
-        about: &mut Understanding,
-        bad: &dyn Fn(&str, &str) -> Error,
-    ) -> Result<Clock> {
-        let mut steps: Vec<f64> = raw.vehicles.iter().flat_map(|vehicle| vehicle.samples.steps()).collect();
-        if steps.is_empty() {
-            return Err(bad("no vehicle has two samples", "check the columns for vehicle and time"));
-        }
-        let step = median(&mut steps);
-        let origin = raw.vehicles.iter().map(|vehicle| vehicle.samples.of(AT, 0)).fold(f64::INFINITY, f64::min);
-        let (source, rate_hz, scale, first) = if raw.has_frames {
-            let rate_hz = raw.frame_rate_hz.or(preset.frame_rate_hz).ok_or_else(|| {
-                bad("the frame rate is unknown", "set `frame_rate_hz` in the preset, or name a column for `time`")
-            })?;
-            let source = if raw.frame_rate_hz.is_some() { "meta file" } else { "preset" };
-            let stride = step.round().max(1.0);
-            (source, rate_hz / stride, 1.0 / stride, origin / stride)
-        } else {
-            let rate_hz = rate_of_times(raw, step);
-            about.seen.rate_is_of_times = true;
-            if let Some(said) = preset.frame_rate_hz.filter(|said| (said / rate_hz - 1.0).abs() > 0.02) {
-                about.refuse(format!("the times have {rate_hz:.2} frames per second, the preset says {said}"));
-            }
-            ("times", rate_hz, rate_hz, if origin.abs() < 1e6 { origin * rate_hz } else { 0.0 })
-        };
-        if !(0.1..=1e4).contains(&rate_hz) {
-            return Err(bad(
-                &format!("{rate_hz} frames per second: the times or the frame rate are wrong"),
-                "check the unit of `time` (s, ms, us, ns, date), or `frame_rate_hz`",
-            ));
-        }
-        let factor = preset.resample_hz.map_or(1.0, |wanted| wanted / rate_hz);
-        let rate_hz = rate_hz * factor;
-        about.fact("rate", format!("{} Hz, from the {source}", value(rate_hz)));
-        Ok(Clock { rate_hz, origin, first_frame: first.round() * factor, scale, factor })
+/// The frame rate, frames of the recording per frame as recorded, and what turns frames or times of the file into frames of
+/// the recording.
+fn clock(
+    raw: &RawRecording,
+    preset: &Preset,
+    about: &mut Understanding,
+    bad: &dyn Fn(&str, &str) -> Error,
+) -> Result<(f64, f64, impl Fn(f64) -> f64 + use<>)> {
+    let mut steps: Vec<f64> = raw.vehicles.iter().flat_map(|vehicle| vehicle.samples.steps()).collect();
+    if steps.is_empty() {
+        return Err(bad("no vehicle has two samples", "check the columns for vehicle and time"));
     }
-
-    fn frame(&self, at: f64) -> f64 {
-        self.first_frame + (at - self.origin) * self.scale * self.factor
+    let step = median(&mut steps);
+    let origin = raw.vehicles.iter().map(|vehicle| vehicle.samples.of(AT, 0)).fold(f64::INFINITY, f64::min);
+    // Frames as recorded: per second, per unit of the file's times, and that of the first time.
+    let (source, rate_hz, scale, first) = if raw.has_frames {
+        let rate_hz = raw.frame_rate_hz.or(preset.frame_rate_hz).ok_or_else(|| {
+            bad("the frame rate is unknown", "set `frame_rate_hz` in the preset, or name a column for `time`")
+        })?;
+        let source = if raw.frame_rate_hz.is_some() { "meta file" } else { "preset" };
+        let stride = step.round().max(1.0);
+        (source, rate_hz / stride, 1.0 / stride, origin / stride)
+    } else {
+        let rate_hz = rate_of_times(raw, step);
+        about.seen.rate_is_of_times = true;
+        if let Some(said) = preset.frame_rate_hz.filter(|said| (said / rate_hz - 1.0).abs() > 0.02) {
+            about.refuse(format!("the times have {rate_hz:.2} frames per second, the preset says {said}"));
+        }
+        ("times", rate_hz, rate_hz, if origin.abs() < 1e6 { origin * rate_hz } else { 0.0 })
+    };
+    if !(0.1..=1e4).contains(&rate_hz) {
+        let problem = format!("{rate_hz} frames per second: the times or the frame rate are wrong");
+        return Err(bad(&problem, "check the unit of `time` (s, ms, us, ns, date), or `frame_rate_hz`"));
     }
+    let factor = preset.resample_hz.map_or(1.0, |wanted| wanted / rate_hz);
+    about.fact("rate", format!("{} Hz, from the {source}", value(rate_hz * factor)));
+    let first = first.round() * factor;
+    Ok((rate_hz * factor, factor, move |at| first + (at - origin) * scale * factor))
 }
 
 /// By how much each step of a vehicle differs from what the step before it and the one after it tell, whichever is closer, less
 /// what an acceleration explains, m. What lies to the side counts for less.
-fn step_differences_m(samples: &[Sample], clock: &Clock) -> Vec<f64> {
+fn step_differences_m(samples: &[Sample], time_s: impl Fn(f64) -> f64) -> Vec<f64> {
     let (Some(first), Some(last)) = (samples.first(), samples.last()) else { return Vec::new() };
     let minus = |a: &Sample, b: &Sample| [a[X] - b[X], a[Y] - b[Y]];
-    let time_s = |sample: &Sample| clock.frame(sample[AT]) / clock.rate_hz;
     let steps: Vec<([f64; 2], f64)> =
-        samples.windows(2).map(|pair| (minus(&pair[1], &pair[0]), time_s(&pair[1]) - time_s(&pair[0]))).collect();
+        samples.windows(2).map(|pair| (minus(&pair[1], &pair[0]), time_s(pair[1][AT]) - time_s(pair[0][AT]))).collect();
     let overall = unit(minus(last, first));
     let difference_m = |k: usize, beside: usize| {
         let ((by, dt_s), (other, other_s)) = (steps[k], steps[beside]);
