@@ -149,7 +149,7 @@ fn plan_file(folder: &Path, study: &StudyCases) {
 fn density() -> DensityModel {
     let facts =
         DataProvenance { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
-    let options = FitOptions { representativeness: false, valid_draws: 1000, ..FitOptions::default() };
+    let options = FitOptions { valid_draws: 1000, ..FitOptions::default() };
     let generator = GeneratorOptions { recordings: 24, ..GeneratorOptions::default() };
     let scenarios = mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap().scenarios;
     DensityModel::fit(Parameterization::find(Category::CutIn, "2").unwrap(), &scenarios, &facts, &options)

@@ -16,7 +16,6 @@ struct Generation {
     first_mean: u32,
     first_factor: u32,
     first_factor_of: u32,
-    first_knot: u32,
     // Entries of each sample in the table of instants.
     stride: u32,
 }

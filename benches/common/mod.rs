@@ -30,11 +30,11 @@ pub fn paper_size_scenarios() -> Vec<Scenario> {
     scenarios
 }
 
-/// A density of synthetic scenarios without the check of its representativeness.
+/// A density of synthetic scenarios.
 pub fn density(category: Category, key: &str, scenarios: &[Scenario]) -> DensityModel {
     let facts =
         DataProvenance { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
-    let options = FitOptions { representativeness: false, valid_draws: 1000, ..FitOptions::default() };
+    let options = FitOptions { valid_draws: 1000, ..FitOptions::default() };
     DensityModel::fit(Parameterization::find(category, key).unwrap(), scenarios, &facts, &options).unwrap().model
 }
 

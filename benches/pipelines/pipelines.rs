@@ -126,8 +126,7 @@ fn sampled_plans(samples: u64) -> Vec<(Parameterization, LanePlan)> {
         let headways = SampleHeadways::Each(vec![Headway::ThwS(1.0)]);
         let options = SampleOptions::new(Estimator::CRUDE, samples, headways);
         let profile = Profile::load("paper").expect("a profile");
-        let mixture = density.mixture().expect("a mixture");
-        (*density.space.id(), plan_samples(&density, &mixture, &profile, &options).expect("a plan"))
+        (*density.space.id(), plan_samples(&density, &profile, &options).expect("a plan"))
     };
     keys.into_iter().map(plan).collect()
 }

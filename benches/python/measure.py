@@ -145,7 +145,7 @@ def driver() -> None:
 
 def problem() -> tuple[lanesweep.LimitState, Path, tempfile.TemporaryDirectory[str]]:
     keep = tempfile.TemporaryDirectory()
-    lanesweep.fit(categories="cut-in", parameterizations=2, no_comparison=True, out=keep.name)
+    lanesweep.fit(categories="cut-in", parameterizations=2, out=keep.name)
     path = Path(keep.name) / "cut-in-2.json"
     return lanesweep.LimitState(path, model="FSM", criterion="collision", thw=1.2), path, keep
 

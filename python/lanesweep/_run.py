@@ -64,7 +64,7 @@ def progress() -> tuple[Callable[[str, int, int], None] | None, Callable[[], Non
 #: Parameters that hold further arguments.
 _GROUPS = ("options", "case")
 #: Arguments that take names with values.
-_TABLES = ("config", "given", "panel", "set")
+_TABLES = ("config", "panel", "set")
 
 
 def plain(value: Any, name: str) -> Any:

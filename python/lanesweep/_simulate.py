@@ -168,8 +168,8 @@ class LimitState(_core.LimitState):
     parameters : list of str
         Names of the columns of points, with units.
     points : list of list of float
-        The recorded scenarios, and `kernel_deviations` of the kernels around them: together they are a density of form
-        ``kernel``. `log_density(points)` evaluates a density of any form within its valid region (`is_valid(points)`).
+        The recorded scenarios, and `kernel_deviations` of the kernels around them: together they are the density.
+        `log_density(points)` evaluates it within its valid region (`is_valid(points)`).
     valid_share : float
         Fraction of the density before its truncation that lies in the valid region.
     """

@@ -185,10 +185,8 @@ def fit(
     categories: Categories | None = None,
     parameterizations: Keys | None = None,
     with_thw: bool = False,
-    density: Literal["kernel", "mixture", "copula"] | None = None,
     hours: Float | None = None,
     km: Float | None = None,
-    no_comparison: bool = False,
     without_scenarios: bool = False,
     seed: Int | None = None,
     out: Path | None = None,
@@ -196,8 +194,7 @@ def fit(
 ) -> Result:
     """Fit densities to the parameters of scenarios, a file per category and parameterization.
 
-    Also computes the physically possible share of each density, how often such scenarios occur, and how well drawn scenarios represent
-    unseen recorded ones.
+    Also computes the physically possible share of each density, and how often such scenarios occur.
 
     Parameters
     ----------
@@ -209,16 +206,12 @@ def fit(
         1 to 7 of cut-ins, a to g of cut-outs, i to v of leader decelerations; by default all.
     with_thw : bool
         Add the observed time headway as a parameter (thw_s).
-    density : {"kernel", "mixture", "copula"}
-        Form of the density, by default kernel. Intervals of a mixture or copula cover the draws alone, and they have no ratio to recorded scenarios.
     hours, km : float
         Driven time, h, and distance, km, of all egos; by default those of the recordings.
-    no_comparison : bool
-        Skip the comparison of drawn with unseen scenarios.
     without_scenarios : bool
         Leave the recorded series out of the files, which can then be shared; `sample` cannot compare its rates with theirs.
     seed : int
-        Seed of P_valid and of the splits of the comparison.
+        Seed of P_valid.
     out : path, optional
         Folder of the density files, or one file .json; without it they go with the result.
     **options
@@ -242,7 +235,6 @@ def sample(
     half_width: Float | None = None,
     estimator: Literal["auto", "mc", "is"] | None = None,
     level: Float | None = None,
-    given: Values | None = None,
     proposal: Paths | None = None,
     time_limit: Float | None = None,
     rows: Path | None = None,
@@ -275,8 +267,6 @@ def sample(
         Crude Monte Carlo, importance sampling, or the cheaper one for each question. ``"auto"`` without a half-width is ``"mc"``.
     level : float
         Level of the intervals, by default 0.95.
-    given : mapping
-        Draw from the density conditional on these values: ``{"v_ego_mps": 30}``.
     proposal : list of paths
         Proposals to sample, with ``estimator="is"``; several are mixed with equal weights.
     time_limit : float

@@ -77,11 +77,7 @@ impl Opened {
     fn log_densities(&self, points: &[Vec<f64>]) -> Result<Vec<f64>> {
         let truncated = truncated(&self.density)?;
         let log_fraction = truncated.validity_fraction().ln();
-        let of = |point: &Vec<f64>| {
-            let latent = self.density.latent(point);
-            truncated.log_density(&latent) - self.density.log_slope(&latent) - log_fraction
-        };
-        Ok(points.iter().map(of).collect())
+        Ok(points.iter().map(|point| truncated.log_density(point) - log_fraction).collect())
     }
 
     /// The limit state of valid points; infinite elsewhere.
@@ -96,12 +92,11 @@ impl Opened {
     }
 
     fn values(&self, points: &[Vec<f64>]) -> Result<Vec<f64>> {
-        let points: Vec<Vec<f64>> = points.iter().map(|point| self.density.latent(point)).collect();
         let question = Question { model: self.model, criterion: self.criterion, headway: 0 };
         let executor = self.backend.executor();
         let lanes = LaneLimitState::new(&self.density, &self.profile, &self.headway, &[question], executor);
         // The first guide of a point is the limit state.
-        Ok(lanes.evaluate(&points)?.into_iter().step_by(lanes.guides()).collect())
+        Ok(lanes.evaluate(points)?.into_iter().step_by(lanes.guides()).collect())
     }
 }
 
@@ -160,9 +155,8 @@ impl LimitState {
         let rows = self.rows(py, &u)?;
         let density = &self.0.density;
         let points = py.detach(|| {
-            let mixture = density.mixture()?;
-            let of = |u: &Vec<f64>| density.values(&mixture.from_standard_normal(u));
-            Ok(rows.par_iter().map(of).collect::<Vec<_>>())
+            let mixture = density.kde.mixture()?;
+            Ok(rows.par_iter().map(|u| mixture.from_standard_normal(u)).collect::<Vec<_>>())
         });
         let points = points.map_err(|error: Error| exception(py, &error))?;
         Ok(PyArray2::from_vec2(py, &points)?)
@@ -205,9 +199,9 @@ impl LimitState {
     fn _draw<'py>(&self, py: Python<'py>, count: usize, seed: u64) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let density = &self.0.density;
         let drawn = py.detach(|| {
-            let mixture = density.mixture()?;
+            let mixture = density.kde.mixture()?;
             let stream = Stream { seed, purpose: SAMPLE_PURPOSE };
-            let draws = (0_u64..).map(|index| density.values(&mixture.draw(&stream, index, 0)));
+            let draws = (0_u64..).map(|index| mixture.draw(&stream, index, 0));
             Ok(draws.filter(|point| density.space.is_valid(point)).take(count).collect::<Vec<_>>())
         });
         let drawn = drawn.map_err(|error: Error| exception(py, &error))?;

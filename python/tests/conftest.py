@@ -36,5 +36,5 @@ def scenarios(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def density(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A density of cut-ins."""
     folder = tmp_path_factory.mktemp("density")
-    lanesweep.fit(synth_recordings=6, categories="cut-in", parameterizations=2, no_comparison=True, out=folder)
+    lanesweep.fit(synth_recordings=6, categories="cut-in", parameterizations=2, out=folder)
     return folder / "cut-in-2.json"

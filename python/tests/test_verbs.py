@@ -238,7 +238,7 @@ def test_infinite_numbers_and_empty_tables_of_verbs_are_what_they_are(density, t
 
 
 def test_a_single_density_is_among_the_densities_of_its_fit(density, tmp_path) -> None:
-    options = {"synth_recordings": 6, "categories": "cut-in", "parameterizations": 2, "no_comparison": True}
+    options = {"synth_recordings": 6, "categories": "cut-in", "parameterizations": 2}
     one = lanesweep.fit(**options, out=tmp_path / "one.json")
     assert one.densities == {"one": tmp_path / "one.json"} and os.fspath(one) == str(tmp_path / "one.json")
     assert lanesweep.sample(one.densities["one"], samples=100, thw=1.2, models="FSM").status == "ok"
@@ -291,7 +291,6 @@ def test_values_keep_their_meaning_and_names_their_letters(density, scenarios, t
         (lambda: lanesweep.study(scenarios=tmp_path / "my --models.jsonl"), lanesweep.LanesweepError, "my --models.jsonl"),
         (lambda: lanesweep.tracks(None), lanesweep.UsageError, "`paths`: it is needed"),
         (lambda: lanesweep.tracks(scenarios), lanesweep.InputError, "scenarios.jsonl"),
-        (lambda: lanesweep.sample(density, given={}), ValueError, "`given` is empty"),
         (lambda: lanesweep.study(thw=[[1.0]]), TypeError, "`thw` has the value"),
     ]:
         with pytest.raises(kind, match=re.escape(message)):

@@ -1,12 +1,7 @@
-// Sample index → point: twin of src/engine/generated/points.rs. `numbers` holds means, factors and knots as bits.
+// Sample index → point: twin of src/engine/generated/points.rs. `numbers` holds means and factors as bits.
 
 // Blocks of four words per draw.
 const BLOCKS: u32 = 4u;
-
-// Knots of a transformation are at −8, −8 + 1/16, …, 8.
-const PIECES: u32 = 256u;
-const KNOT_LIMIT: f32 = 8.0;
-const KNOTS_PER_UNIT: f32 = 16.0;
 
 const SOURCE_RANDOM: u32 = 0u;
 const SOURCE_SOBOL: u32 = 1u;
@@ -16,8 +11,6 @@ const SOURCE_GIVEN: u32 = 2u;
 override points_source: u32;
 // Components have weights.
 override points_weighted: bool;
-// Draws are transformed.
-override points_transformed: bool;
 
 struct Drawn {
     values: array<f32, MAX_PARAMETERS>,
@@ -88,24 +81,5 @@ fn candidate(index: vec2<u32>, attempt: u32) -> Drawn {
         }
         values[j] = value;
     }
-    if points_transformed {
-        for (var j = 0u; j < recipe_dimensions; j++) {
-            values[j] = transformed(generation.first_knot + j * (PIECES + 1u), values[j]);
-        }
-    }
     return Drawn(values, attempt + 1u, component);
-}
-
-// The linear piece between two knots; the outermost pieces continue.
-fn transformed(knots: u32, z: f32) -> f32 {
-    let position = (z + KNOT_LIMIT) * KNOTS_PER_UNIT;
-    var piece = 0u;
-    if position >= f32(PIECES - 1u) {
-        piece = PIECES - 1u;
-    } else if position >= 1.0 {
-        piece = u32(position);
-    }
-    let left = number(knots + piece);
-    let right = number(knots + piece + 1u);
-    return left + (right - left) * (position - f32(piece));
 }

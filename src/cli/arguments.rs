@@ -319,20 +319,6 @@ impl Arguments {
         parsed.map_err(|problem| Error::usage(Place::option(name), problem, ""))
     }
 
-    /// Takes an argument with several values, each of which a function parses.
-    ///
-    /// # Errors
-    /// As [`Arguments::take`].
-    pub(super) fn parse_each<T>(
-        &mut self,
-        name: &'static str,
-        parser: impl Fn(&str) -> std::result::Result<T, String>,
-    ) -> Result<Vec<T>> {
-        let texts: Vec<String> = self.take(name)?;
-        let parsed = texts.iter().map(|text| parser(text)).collect::<std::result::Result<_, _>>();
-        parsed.map_err(|problem| Error::usage(Place::option(name), problem, ""))
-    }
-
     /// Takes the value of an argument as it is.
     pub(super) fn value(&mut self, name: &str) -> Option<Value> {
         self.values.remove(name)
@@ -369,13 +355,11 @@ impl<T: FromArguments> FromArguments for Box<T> {
     }
 }
 
-/// Implements [`FromArguments`]: fields that take their values, fields that a function parses, fields with several values that a
-/// function parses each, and groups.
+/// Implements [`FromArguments`]: fields that take their values, fields that a function parses, and groups.
 macro_rules! from_arguments {
     (
         $type:ident { $($field:ident),* $(,)? }
         $(parsed { $($parsed:ident: $parser:expr),* $(,)? })?
-        $(each { $($each:ident: $of_each:expr),* $(,)? })?
         $(groups { $($group:ident),* $(,)? })?
         $(others { $($other:ident: $value:expr),* $(,)? })?
     ) => {
@@ -384,7 +368,6 @@ macro_rules! from_arguments {
                 Ok($type {
                     $($field: arguments.take(stringify!($field))?,)*
                     $($($parsed: arguments.parse(stringify!($parsed), $parser)?,)*)?
-                    $($($each: arguments.parse_each(stringify!($each), $of_each)?,)*)?
                     $($($group: $crate::cli::arguments::FromArguments::from_arguments(arguments)?,)*)?
                     $($($other: $value,)*)?
                 })

@@ -26,9 +26,8 @@ use crate::{Error, Place, Result};
 /// How are the parameters of scenarios distributed?
 ///
 /// Fits a density to the kept scenarios of each category under each parameterization. Computes the physically
-/// possible fraction of each density, how often such scenarios occur, and how well drawn scenarios represent unseen
-/// real ones. Writes one density file per parameterization. Without data it uses generated recordings. Tables go to
-/// stdout, files to --out.
+/// possible fraction of each density, and how often such scenarios occur. Writes one density file per parameterization.
+/// Without data it uses generated recordings. Tables go to stdout, files to --out.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:\n  lanesweep fit recordings --out densities\n  lanesweep fit --scenarios \
@@ -47,9 +46,6 @@ pub(super) struct Fit {
     /// Add the observed time headway as a parameter (thw_s)
     #[arg(long, help_heading = "Scenario")]
     with_thw: bool,
-    /// Skip the comparison of drawn with unseen scenarios
-    #[arg(long, help_heading = "Models and criteria", hide_short_help = true)]
-    no_comparison: bool,
     /// Leave the recorded series out of the density files
     ///
     /// `sample` then cannot compare its rates with those of the recorded scenarios. Use it if you share the file but
@@ -63,7 +59,7 @@ pub(super) struct Fit {
 }
 
 from_arguments!(
-    Fit { out, with_thw, no_comparison, without_scenarios }
+    Fit { out, with_thw, without_scenarios }
     groups { data, categories, parameterizations, exposure, format }
 );
 
@@ -75,11 +71,9 @@ impl Fit {
         let options = FitOptions {
             parameterization: config.of_densities(),
             with_thw: self.with_thw,
-            kind: config.fit.density,
             rule: config.fit.bandwidth_rule,
             valid_draws: config.fit.valid_draws,
             seed: config.fit.seed,
-            representativeness: !self.no_comparison,
         };
         let files = self.files(&ids, configured)?;
         let (collection, facts) = self.data.load_with_exposure(configured, typed)?;
@@ -100,7 +94,7 @@ impl Fit {
                     }
                     Err(error) => return Err(error),
                 };
-                bar.suspend(|| console::warn(result.left_out.iter().chain(&result.not_compared)));
+                bar.suspend(|| console::warn(&result.left_out));
                 if self.without_scenarios {
                     result.model.scenarios.clear();
                 }

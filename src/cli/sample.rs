@@ -25,7 +25,7 @@ use crate::stats::density::DensityModel;
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(mut_args(|arg| match arg.get_id().as_str() {
-    "density" | "models" | "thw" | "given" | "proposal" => arg.conflicts_with("plan"),
+    "density" | "models" | "thw" | "proposal" => arg.conflicts_with("plan"),
     "rows" => arg.conflicts_with("plan_only"),
     "failures" => arg.conflicts_with_all(["shard", "plan_only"]),
     _ => arg,
@@ -54,9 +54,6 @@ pub(crate) struct Sample {
     /// The first 1000, or sample.failures_limit; with the columns of --rows. For a run in parts: `merge --failures`.
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub(super) failures: Option<PathBuf>,
-    /// Draw from the density conditional on this value (mc); repeatable
-    #[arg(long, value_name = "NAME=VALUE", value_parser = given, help_heading = "Scenario")]
-    pub(super) given: Vec<(String, f64)>,
     /// Proposal file to sample, with --estimator is; repeatable
     ///
     /// Several are mixed with equal weights.
@@ -78,7 +75,6 @@ pub(crate) struct Sample {
 
 from_arguments!(
     Sample { density, thw, rows, failures, proposal, out }
-    each { given: given }
     groups { models, plausibility, format, shards }
     others { settings: SampleSettings::default() }
 );
@@ -90,8 +86,7 @@ impl Sample {
 
     /// Whether importance sampling answers what crude Monte Carlo would answer at a higher cost.
     pub(super) fn is_refined(&self) -> bool {
-        let needs_crude = !self.given.is_empty()
-            || self.rows.is_some()
+        let needs_crude = self.rows.is_some()
             || self.settings.points == SampleSource::Sobol
             || self.settings.time_limit_s.is_some()
             || self.shards.is_part()
@@ -112,11 +107,4 @@ impl Sample {
             Some(list) => Ok(SampleHeadways::Each(lists::headways(list, "`paper` or `observed`")?)),
         }
     }
-}
-
-/// `NAME=VALUE`.
-fn given(text: &str) -> std::result::Result<(String, f64), String> {
-    let (name, value) = text.split_once('=').ok_or("write NAME=VALUE, such as v_ego_mps=30")?;
-    let value: f64 = value.trim().parse().map_err(|_| format!("`{value}` is not a number"))?;
-    if value.is_finite() { Ok((name.trim().to_owned(), value)) } else { Err("the value is not finite".to_owned()) }
 }

@@ -11,7 +11,6 @@ use crate::report::lanes::table_format;
 use crate::run::sampling::{Estimator, SampleHeadways, SampleOptions, SampleSource, read_proposal};
 use crate::stats::density::{DensityModel, Mixture};
 use crate::stats::estimate::{BinomialInterval, Checkpoints, Goal, Search, StopRule};
-use crate::support::plausibility::{Doubts, HELP};
 use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
@@ -39,7 +38,6 @@ impl Sample {
             EstimatorKind::Is if self.proposal.is_empty() => MAX_DRAWS,
             _ => DEFAULT_SAMPLES,
         });
-        self.check_given(density)?;
         let headways = self.headways(density)?;
         Ok(SampleOptions {
             models: self.models()?,
@@ -47,23 +45,9 @@ impl Sample {
             seed: self.settings.seed,
             level: self.settings.level,
             stop: self.stop(samples),
-            given: self.given.clone(),
             source: self.settings.points,
             ..SampleOptions::new(self.estimator(density)?, samples, headways)
         })
-    }
-
-    /// Checks the values of `--given`, and warns about doubtful ones.
-    fn check_given(&self, density: &DensityModel) -> Result<()> {
-        let mut doubts = Doubts::new(self.plausibility.policy());
-        for (name, value) in &self.given {
-            let parameter = &density.space.parameters()[density.space.index_of(name)?];
-            let Some(quantity) = parameter.quantity() else { continue };
-            let judged = doubts.check(quantity, *value, || format!("--given {name}"));
-            judged.map_err(|problem| Error::usage(Place::item("--given"), format!("`{name}`: {problem}"), HELP))?;
-        }
-        doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
-        Ok(())
     }
 
     /// The search of importance sampling over so many lanes per draw. The lanes of a driver outside the registry are
@@ -132,11 +116,8 @@ impl Sample {
     pub(super) fn check(&self) -> Result<()> {
         let settings = &self.settings;
         let is_crude = self.is_crude();
-        let belongs_to_crude = [
-            ("--rows", self.rows.is_some()),
-            ("--given", !self.given.is_empty()),
-            ("sample.points=sobol", settings.points == SampleSource::Sobol),
-        ];
+        let belongs_to_crude =
+            [("--rows", self.rows.is_some()), ("sample.points=sobol", settings.points == SampleSource::Sobol)];
         if let Some((flag, _)) = belongs_to_crude.iter().find(|(_, given)| *given && !is_crude) {
             return Err(only_crude(flag));
         }

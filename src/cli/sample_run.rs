@@ -13,7 +13,7 @@ use crate::report::lanes;
 use crate::report::sampling::SampleReport;
 use crate::run::parts::{EachChunk, Job, PLAN_FILE};
 use crate::run::sampling::{
-    self, EstimateRow, FailingLane, SampleJob, SampleKind, SampleOptions, SampleResult, SampleSource, conditional,
+    self, EstimateRow, FailingLane, SampleJob, SampleKind, SampleOptions, SampleResult, SampleSource,
 };
 use crate::stats::density::read_density;
 use crate::stats::estimate::{Search, StopRule};
@@ -23,9 +23,6 @@ use crate::support::readable::{count, counted, duration};
 use crate::support::run_folder::{ESTIMATE_RECORD, RunFolder};
 use crate::support::table::TableWriter;
 use crate::{Error, Place, Result};
-
-/// A condition near fewer scenarios than this is outside the data.
-const FEW_SCENARIOS: f64 = 5.0;
 
 impl Sample {
     pub(crate) fn run(&self, configured: &Configured) -> Result<Output> {
@@ -140,7 +137,9 @@ impl Sample {
         executor: &Executor,
         configured: &Configured,
     ) -> Result<Output> {
-        warn(sample)?;
+        if sample.options.source == SampleSource::Sobol {
+            tracing::warn!("Sobol points: the intervals are those of independent draws, so they are conservative");
+        }
         // Rows are written during the run, so a run with rows cannot resume.
         let Some(mut run) = job.open(&self.out, self.shards.shard, self.rows.is_none())? else {
             tracing::info!("this part exists already and is complete");
@@ -242,24 +241,4 @@ fn warn_of_long(sample: &sampling::Sample, search: &Search) -> u64 {
         }
     }
     most
-}
-
-/// Warns about limits of the estimates of crude Monte Carlo.
-fn warn(sample: &sampling::Sample) -> Result<()> {
-    let (density, options) = (&sample.density, &sample.options);
-    if options.source == SampleSource::Sobol {
-        tracing::warn!("Sobol points: the intervals are those of independent draws, so they are conservative");
-    }
-    if !options.given.is_empty() {
-        let left = conditional(density, &options.given)?.effective_scenarios;
-        let of = density.kde.points().len();
-        if left < FEW_SCENARIOS {
-            tracing::warn!(
-                "only {left:.1} of {of} scenarios are near the given values: results depend on the kernels, not on data"
-            );
-        } else {
-            tracing::info!("{left:.1} of {of} scenarios are near the given values");
-        }
-    }
-    Ok(())
 }

@@ -126,9 +126,6 @@ impl Canonical {
         self.floats(&points.means);
         self.words(&points.factor_of);
         self.floats(&points.factors);
-        if !points.knots.is_empty() {
-            self.floats(&points.knots);
-        }
         // Words and floats without padding: a device gets the same record.
         self.words(bytemuck::cast_slice(std::slice::from_ref(recipe)));
         self.floats(basis);

@@ -14,7 +14,7 @@ mod philox;
 mod sobol;
 mod uniform;
 
-pub use normal::{KNOT_LIMIT, PIECES, normal_table, standard_normal};
+pub use normal::{normal_table, standard_normal};
 pub use philox::{Stream, philox4x32_10};
 pub use sobol::{SOBOL_POINTS, SOBOL_ROW, Sobol};
 pub use uniform::{AliasTable, choose, unit_uniform};

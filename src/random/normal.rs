@@ -12,11 +12,6 @@
 
 use std::sync::LazyLock;
 
-/// A piecewise linear function of a standard normal deviate has its knots at −8, −8 + 1/16, …, 8. Beyond, the outermost
-/// pieces continue.
-pub const KNOT_LIMIT: f64 = 8.0;
-/// Number of pieces between the knots.
-pub const PIECES: usize = 256;
 /// Number of bits that select the segment of an octave.
 const SEGMENT_BITS: u32 = 4;
 /// Octaves of tail probability: 2⁻¹ … 2⁻², 2⁻² … 2⁻³, and so on down to 2⁻³³.

@@ -2,11 +2,9 @@
 
 use std::fmt::Write;
 
-use crate::stats::density::{
-    DensityModel, Exposure, Rate, Refused, Representativeness, SearchEnd, ValidFraction, standard_deviation,
-};
-use crate::support::readable::{count, count_of, counted, significant};
-use crate::support::table::{Column, Digits, NamedValue, Table};
+use crate::stats::density::{DensityModel, Exposure, Rate, Refused, SearchEnd, ValidFraction, standard_deviation};
+use crate::support::readable::{count, count_of, significant};
+use crate::support::table::{Column, Digits, Table};
 
 /// One density without its kernels.
 pub fn text(model: &DensityModel) -> String {
@@ -23,24 +21,19 @@ pub fn text(model: &DensityModel) -> String {
         count(provenance.left_out)
     );
     text.push_str(&parameters(model).text());
-    if let Some(of) = &model.transformed {
-        let _ = writeln!(text, "form       {} of {}", of.kind.key(), counted(of.mixture.weights().len(), "component"));
-    }
-    if model.transformed.is_none() {
-        let bandwidth = model.kde.bandwidth();
-        let end = match bandwidth.end {
-            SearchEnd::Inside => "",
-            SearchEnd::Lower => "; the search ended at the rule's lower end",
-            SearchEnd::Upper => "; the search ended at the rule's upper end",
-        };
-        let _ = writeln!(
-            text,
-            "bandwidth  {} (rule `{}`; Silverman's {}){end}",
-            short(bandwidth.value),
-            bandwidth.rule.key(),
-            short(bandwidth.silverman)
-        );
-    }
+    let bandwidth = model.kde.bandwidth();
+    let end = match bandwidth.end {
+        SearchEnd::Inside => "",
+        SearchEnd::Lower => "; the search ended at the rule's lower end",
+        SearchEnd::Upper => "; the search ended at the rule's upper end",
+    };
+    let _ = writeln!(
+        text,
+        "bandwidth  {} (rule `{}`; Silverman's {}){end}",
+        short(bandwidth.value),
+        bandwidth.rule.key(),
+        short(bandwidth.silverman)
+    );
     let valid = &model.valid;
     let _ = writeln!(
         text,
@@ -56,9 +49,6 @@ pub fn text(model: &DensityModel) -> String {
         let _ = writeln!(text, "refused    {}", refused(valid));
     }
     let _ = writeln!(text, "exposure   {}", model.exposure.as_ref().map_or(UNKNOWN.to_owned(), exposure));
-    if let Some(representativeness) = &model.representativeness {
-        text.push_str(&compared(representativeness));
-    }
     text
 }
 
@@ -77,12 +67,9 @@ pub fn record(model: &DensityModel) -> serde_json::Value {
         "kept": provenance.kept,
         "left_out": provenance.left_out,
         "parameters": parameters.records(),
-        "form": model.kind(),
-        "components": model.components(),
         "bandwidth": model.kde.bandwidth(),
         "valid": model.valid,
         "exposure": model.exposure,
-        "representativeness": model.representativeness,
     })
 }
 
@@ -96,7 +83,7 @@ fn parameters(model: &DensityModel) -> Table {
         .column(number("mean"), |(j, _)| mean(values(j)))
         .column(number("deviation"), |(j, _)| standard_deviation(&values(j)))
         .column(number("scale"), |(j, _)| model.kde.scale()[j])
-        .column(number("kernel").null("-"), |(j, _)| model.transformed.is_none().then(|| model.kde.spread()[j]))
+        .column(number("kernel"), |(j, _)| model.kde.spread()[j])
         .column("valid", |(_, parameter)| parameter.bounds_text())
         .build()
 }
@@ -131,56 +118,15 @@ fn exposure(exposure: &Exposure) -> String {
     parts.join("\n           ")
 }
 
-fn compared(r: &Representativeness) -> String {
-    let mut text = format!(
-        "M          {} ± {} over {} splits of {} training and {} test scenarios, seed {}\n           W(gen, test) \
-         {}, W(gen, train) {}, W(train, test) {}\n",
-        short(r.metric),
-        short(r.metric_deviation),
-        r.repetitions,
-        r.train,
-        r.test,
-        r.seed,
-        short(r.generated_test),
-        short(r.generated_train),
-        short(r.train_test)
-    );
-    if let (Some(sinkhorn), Some(log_likelihood)) = (r.sinkhorn, r.log_likelihood) {
-        let _ = writeln!(
-            text,
-            "held out   log-likelihood {} ± {} per scenario, larger is better; Sinkhorn divergence {}, smaller is better",
-            short(log_likelihood),
-            short(r.log_likelihood_deviation.unwrap_or(0.0)),
-            short(sinkhorn)
-        );
-    }
-    text
-}
-
 /// One row per density.
 pub fn summary(models: &[&DensityModel]) -> String {
-    let distances: [NamedValue<Representativeness, f64>; 4] = [
-        ("M", |r| r.metric),
-        ("W(gen, test)", |r| r.generated_test),
-        ("W(train, test)", |r| r.train_test),
-        ("log-likelihood", |r| r.log_likelihood.unwrap_or(f64::NAN)),
-    ];
     let rows = Table::of(models.iter().copied())
         .column("density", |model| format!("{} {}", model.space.id().category.label(), model.space.id().key))
         .column("parameters", |model| model.space.dimensions())
         .column("scenarios", |model| model.kde.points().len())
-        .column(number("bandwidth").null("-"), |model| model.transformed.is_none().then(|| model.kde.bandwidth().value))
-        .column(number("P_valid").digits(Digits::Fixed(4)), |model| model.valid.estimate)
-        .columns(
-            distances,
-            |(name, _)| number(name).null("-"),
-            |model, (_, of)| model.representativeness.as_ref().map(of),
-        );
-    format!(
-        "All densities. M and W compare SVD parameterizations of one category with each other; those of kinematic \
-         ones\nhave their own units each.\n{}",
-        rows.build().text()
-    )
+        .column(number("bandwidth"), |model| model.kde.bandwidth().value)
+        .column(number("P_valid").digits(Digits::Fixed(4)), |model| model.valid.estimate);
+    format!("All densities\n{}", rows.build().text())
 }
 
 fn number(name: &'static str) -> Column {

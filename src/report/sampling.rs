@@ -13,7 +13,7 @@ use crate::engine::{ENGINE_VERSION, Headway, LanePlan, SampleTally};
 use crate::model::profile::Profile;
 use crate::run::sampling::{EstimateRow, RiskRate, SampleOptions};
 use crate::scenario::Category;
-use crate::stats::density::{DensityKind, DensityModel, Provenance};
+use crate::stats::density::{DensityModel, Provenance};
 use crate::stats::estimate::{IntervalKind, Ratio, SearchRound, StopReason, WeightFigures};
 use crate::support::readable::{count, count_of, significant, value};
 use crate::support::run_folder::ResultFiles;
@@ -32,8 +32,6 @@ pub struct DensityRecord {
     pub parameters: Vec<String>,
     /// Number of scenarios in its fit.
     pub kernels: usize,
-    /// Its form.
-    pub form: DensityKind,
     /// Provenance of its data.
     pub provenance: Provenance,
 }
@@ -50,7 +48,6 @@ impl DensityRecord {
             parameterization: density.space.id().key.to_string(),
             parameters: density.space.parameters().iter().map(|p| p.name.clone()).collect(),
             kernels: density.kde.points().len(),
-            form: density.kind(),
             provenance: density.provenance.clone(),
         })
     }
@@ -137,8 +134,6 @@ impl SampleReport {
             points: self.options.source.key(),
             samples: self.options.stop.samples,
             seed: self.options.seed,
-            // Parameters with given values; the estimates are conditional on them.
-            given: &self.options.given,
             plan_sha256: &self.plan_sha256,
             draws: &self.draws,
             options: &self.options,
@@ -170,13 +165,10 @@ impl SampleReport {
         let density = &self.density;
         let _ = writeln!(
             text,
-            "{} {}: {} ({})",
+            "{} {}: density over {} scenarios ({})",
             density.category.label(),
             density.parameterization,
-            match density.form {
-                DensityKind::Kernel => format!("density over {} scenarios", count_of(density.kernels)),
-                form => format!("{} density over {} scenarios", form.key(), count_of(density.kernels)),
-            },
+            count_of(density.kernels),
             density.provenance.data
         );
         if let Some(draws) = self
@@ -207,9 +199,6 @@ impl SampleReport {
                 },
             );
         }
-        if let Some(given) = self.given_list() {
-            let _ = writeln!(text, "given {given}: probabilities are conditional, risks are not known");
-        }
         text.push_str(&self.table(|row| row.is_overall(&self.estimates)).text());
         if self.has_rare() {
             text.push_str("Rare failures, by importance sampling:\n");
@@ -239,10 +228,9 @@ impl SampleReport {
         if self.estimates.iter().any(|r| r.is_overall(&self.estimates) && r.estimate.probability < resolved) {
             let _ = writeln!(
                 text,
-                "Probabilities below {} (one in {} scenarios) come from the tails of the density{}, not from data",
+                "Probabilities below {} (one in {} scenarios) come from the tails of the density's kernels, not from data",
                 short(resolved),
-                count_of(self.density.kernels),
-                if self.density.form == DensityKind::Kernel { "'s kernels" } else { "" }
+                count_of(self.density.kernels)
             );
         }
         if self.density.provenance.synthetic {
@@ -306,12 +294,6 @@ impl SampleReport {
     /// Whether rare failures have an estimate by importance sampling, too.
     pub(super) fn has_rare(&self) -> bool {
         self.estimates.iter().any(|row| row.is_rare_beside(&self.estimates))
-    }
-
-    /// The parameters with given values; `None` without any.
-    pub(super) fn given_list(&self) -> Option<String> {
-        let list: Vec<String> = self.options.given.iter().map(|(name, v)| format!("{name} = {}", value(*v))).collect();
-        (!list.is_empty()).then(|| list.join(", "))
     }
 }
 

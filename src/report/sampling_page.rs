@@ -17,9 +17,6 @@ impl SampleReport {
     pub(super) fn html(&self, figures: Vec<PageFigure>) -> String {
         let density = &self.density;
         let mut warnings = Vec::new();
-        if let Some(given) = self.given_list() {
-            warnings.push(format!("Given {given}: probabilities are conditional, risks are not known."));
-        }
         if !self.is_reproducible() {
             warnings.push("Ended by the clock: another machine ends elsewhere.".to_owned());
         }

@@ -26,7 +26,7 @@ fn scenarios() -> &'static [Scenario] {
 fn density(category: Category, key: &str, with_thw: bool) -> DensityModel {
     let facts =
         DataProvenance { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
-    let fit = FitOptions { representativeness: false, valid_draws: 100, with_thw, ..FitOptions::default() };
+    let fit = FitOptions { valid_draws: 100, with_thw, ..FitOptions::default() };
     DensityModel::fit(Parameterization::find(category, key).unwrap(), scenarios(), &facts, &fit).unwrap().model
 }
 

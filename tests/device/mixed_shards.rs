@@ -44,7 +44,7 @@ fn whole_and_shards(counts: &[u64]) {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     let fit = ["fit", "--synth-recordings", "3", "--categories", "cut-in", "--parameterizations", "2"];
-    done(dir, &[&fit[..], &["--no-comparison", "--out", "densities"]].concat());
+    done(dir, &[&fit[..], &["--out", "densities"]].concat());
     let density = "densities/cut-in-2.json";
     let sample = ["sample", density, "--samples", "9000", "--thw", "0.4", "--models", "FSM,RSS"];
     let pilot = ["--estimator", "is", "--backend", "cpu", "--out", "pilot"];

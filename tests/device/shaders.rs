@@ -93,7 +93,7 @@ fn generator_records() -> Vec<Record> {
         record!("DrawnRecord", DrawnRecord, { tries: u32, component: u32 }),
         record!("Generation", Generation, {
             index_low: u32, index_high: u32, count: u32, seed_low: u32, seed_high: u32, purpose: u32,
-            components: u32, first_mean: u32, first_factor: u32, first_factor_of: u32, first_knot: u32,
+            components: u32, first_mean: u32, first_factor: u32, first_factor_of: u32,
             stride: u32,
         }),
     ]
@@ -121,7 +121,6 @@ fn generator_constants() -> Vec<(&'static str, f64)> {
         means,
         factor_of,
         factors,
-        knots: Vec::new(),
     };
     let generator = generated::Generator { points, recipe, basis: Vec::new() };
     let given = generator.shader_constants();
@@ -183,7 +182,6 @@ fn the_generator_has_the_records_the_numbers_and_the_arithmetic_of_its_rust_twin
         ("MAX_PARAMETERS", MAX_PARAMETERS as u32),
         ("MAX_BOUNDS", MAX_BOUNDS as u32),
         ("ATTEMPTS", ATTEMPTS),
-        ("PIECES", lanesweep::stats::random::PIECES as u32),
         ("NO_SLOT", NO_SLOT),
         ("TARGET_SPEED", Variable::TargetSpeed as u32),
         ("LATERAL_SPEED", Variable::LateralSpeed as u32),

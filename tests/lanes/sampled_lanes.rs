@@ -18,7 +18,7 @@ use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::DataProvenance;
 use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions};
 use lanesweep::scenario::{Category, Scenario, Tables};
-use lanesweep::stats::density::{DensityKind, DensityModel, FitOptions, Mixture};
+use lanesweep::stats::density::{DensityModel, FitOptions};
 use lanesweep::stats::random::Stream;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
@@ -38,7 +38,7 @@ fn density(id: Parameterization, with_thw: bool) -> DensityModel {
 fn density_with(id: Parameterization, options: FitOptions) -> DensityModel {
     let facts =
         DataProvenance { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
-    let options = FitOptions { representativeness: false, valid_draws: 1000, ..options };
+    let options = FitOptions { valid_draws: 1000, ..options };
     DensityModel::fit(id, scenarios(), &facts, &options).unwrap().model
 }
 
@@ -109,7 +109,7 @@ fn draws_have_the_mean_and_the_spread_of_their_mixture_and_stay_valid() {
     let id = Parameterization::find(Category::CutIn, "2").unwrap();
     let density = density(id, false);
     let profile = Profile::load("paper").unwrap();
-    let mixture = density.mixture().unwrap();
+    let mixture = density.kde.mixture().unwrap();
     for source in [SampleSource::Random, SampleSource::Sobol] {
         let generator = generator_of(&density.space, &mixture, &density.sizes, &profile, source, 7).unwrap();
         let n = 1 << 16;
@@ -150,7 +150,7 @@ fn samples_are_the_same_whatever_the_chunks_threads_and_instructions() {
     for id in Parameterization::ALL {
         for (source, n) in [(SampleSource::Random, 300), (SampleSource::Sobol, 100)] {
             let density = density(id, false);
-            let plan = plan_samples(&density, &density.mixture().unwrap(), &profile, &options(n, source)).unwrap();
+            let plan = plan_samples(&density, &profile, &options(n, source)).unwrap();
             let whole = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
             assert!(whole == outcomes(&plan, &CpuBackend::scalar(), &[0, 1, 37, n]), "{id:?} scalar, other chunks");
             for instructions in Instructions::available() {
@@ -173,8 +173,7 @@ fn a_device_makes_the_same_lanes_of_the_same_samples() {
             for (source, with_thw) in [(SampleSource::Random, false), (SampleSource::Sobol, false)] {
                 let n = 400;
                 let density = density(id, with_thw);
-                let mixture = density.mixture().unwrap();
-                let plan = plan_samples(&density, &mixture, &profile, &options(n, source)).unwrap();
+                let plan = plan_samples(&density, &profile, &options(n, source)).unwrap();
                 let ours = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
                 let theirs = outcomes(&plan, &*backend, &[0, 3, 150, n]);
                 let differing = ours.iter().zip(&theirs).filter(|(a, b)| a != b).count();
@@ -187,37 +186,6 @@ fn a_device_makes_the_same_lanes_of_the_same_samples() {
 }
 
 #[test]
-fn transformed_mixtures_are_drawn_alike_on_every_backend() {
-    let device = common::device::software_backend();
-    let (profile, n) = (Profile::load("paper").unwrap(), 500);
-    for (category, key) in
-        [(Category::CutIn, "2"), (Category::CutIn, "6"), (Category::CutOut, "b"), (Category::Lvd, "i")]
-    {
-        for kind in [DensityKind::Mixture, DensityKind::Copula] {
-            let id = Parameterization::find(category, key).unwrap();
-            let density = density_with(id, FitOptions { kind, ..FitOptions::default() });
-            for source in [SampleSource::Random, SampleSource::Sobol] {
-                let plan = plan_samples(&density, &density.mixture().unwrap(), &profile, &options(n, source)).unwrap();
-                let whole = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
-                assert!(whole == outcomes(&plan, &CpuBackend::scalar(), &[0, 7, n]), "{key} {kind:?} {source:?}");
-                if let Some(device) = &device {
-                    assert!(whole == outcomes(&plan, &**device, &[0, n / 3, n]), "{key} {kind:?} {source:?} device");
-                }
-                // A draw of the lanes is the host's draw of the mixture, transformed.
-                let generator = plan.generator().unwrap();
-                let valid = (0..n).map(|index| generator.draw(index)).filter(|drawn| !drawn.is_void());
-                for drawn in valid {
-                    let values: Vec<f64> =
-                        drawn.values[..density.space.dimensions()].iter().map(|v| f64::from(*v)).collect();
-                    assert!(density.mixture().unwrap().log_density(&density.latent(&values)).is_finite());
-                    assert_eq!(generator.points.component(0, drawn.tries), None, "a component is no scenario");
-                }
-            }
-        }
-    }
-}
-
-#[test]
 fn a_device_refuses_the_draws_that_the_host_refuses() {
     let Some(backend) = common::device::software_backend() else { return };
     let profile = Profile::load("paper").unwrap();
@@ -227,11 +195,10 @@ fn a_device_refuses_the_draws_that_the_host_refuses() {
         let options = FitOptions { parameterization, ..FitOptions::default() };
         let density = density_with(Parameterization::find(category, key).unwrap(), options);
         for (source, n) in [(SampleSource::Random, 400), (SampleSource::Sobol, 400)] {
-            let mixture = density.mixture().unwrap();
-            let generator = generator_of(&density.space, &mixture, &density.sizes, &profile, source, 2026).unwrap();
+            let plan = plan_samples(&density, &profile, &self::options(n, source)).unwrap();
+            let generator = plan.generator().unwrap();
             let refused = (0..n).filter(|index| generator.draw(*index).tries > 1).count();
             assert!(refused > 5, "{key} {source:?}: {refused} refused");
-            let plan = plan_samples(&density, &mixture, &profile, &self::options(n, source)).unwrap();
             let ours = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
             assert!(ours == outcomes(&plan, &*backend, &[0, n]), "{key} {source:?}");
         }
@@ -239,23 +206,15 @@ fn a_device_refuses_the_draws_that_the_host_refuses() {
 }
 
 #[test]
-fn a_device_draws_headways_weighted_components_and_given_points_alike() {
+fn a_device_draws_headways_and_given_points_alike() {
     let Some(backend) = common::device::software_backend() else { return };
     let profile = Profile::load("paper").unwrap();
     let n = 500;
     for id in [("1", Category::CutIn), ("b", Category::CutOut), ("f", Category::CutOut), ("ii", Category::Lvd)] {
         let id = Parameterization::find(id.1, id.0).unwrap();
         let density = density(id, true);
-        let kernels = density.mixture().unwrap();
-        // A second mixture of another shape beside: weights and two factors.
-        let mean = kernels.mean(0).to_vec();
-        let d = mean.len();
-        let mut factor = nalgebra::DMatrix::from_diagonal_element(d, d, 0.3);
-        factor.fill_lower_triangle(0.05, 1);
-        let other = Mixture::new(vec![1.0], vec![mean], vec![factor], vec![0]).unwrap();
-        let mixture = Mixture::join(&[(0.7, &kernels), (0.3, &other)]).unwrap();
         let options = SampleOptions { headways: SampleHeadways::Sampled, ..options(n, SampleSource::Random) };
-        let plan = plan_samples(&density, &mixture, &profile, &options).unwrap();
+        let plan = plan_samples(&density, &profile, &options).unwrap();
         let ours = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
         assert!(ours == outcomes(&plan, &*backend, &[0, 77, n]), "{}", id.key);
         let points = density.kde.points();
@@ -271,8 +230,7 @@ fn indices_beyond_32_bits_are_samples_of_their_own() {
     let id = Parameterization::find(Category::CutIn, "1").unwrap();
     let density = density(id, false);
     let profile = Profile::load("paper").unwrap();
-    let plan =
-        plan_samples(&density, &density.mixture().unwrap(), &profile, &options(1 << 34, SampleSource::Random)).unwrap();
+    let plan = plan_samples(&density, &profile, &options(1 << 34, SampleSource::Random)).unwrap();
     let (low, high) = (5_u64, (1_u64 << 32) + 5);
     let run = |backend: &dyn Backend, from: u64| {
         let chunk = backend.prepare(&plan).unwrap().run(from..from + 64, Wanted::Outcomes).unwrap();
@@ -294,8 +252,7 @@ fn verdicts_of_samples_come_without_their_values_too() {
     let id = Parameterization::find(Category::Lvd, "iv").unwrap();
     let density = density(id, false);
     let profile = Profile::load("paper").unwrap();
-    let plan =
-        plan_samples(&density, &density.mixture().unwrap(), &profile, &options(2000, SampleSource::Random)).unwrap();
+    let plan = plan_samples(&density, &profile, &options(2000, SampleSource::Random)).unwrap();
     let cpu = CpuBackend::lane_arithmetic();
     let mut verdicts = Vec::new();
     Executor::new(&cpu)
@@ -331,10 +288,9 @@ fn failures_of_samples_and_studies_vary_smoothly_with_the_time_step() {
         .collect();
     let shares = |dt_s: f64| -> Vec<Vec<f64>> {
         let profile = Profile::load("paper").unwrap().with_dt(dt_s).unwrap();
-        let sampled = densities.iter().map(|density| {
-            let mixture = density.mixture().unwrap();
-            failures(&plan_samples(density, &mixture, &profile, &options(4000, SampleSource::Random)).unwrap())
-        });
+        let sampled = densities
+            .iter()
+            .map(|density| failures(&plan_samples(density, &profile, &options(4000, SampleSource::Random)).unwrap()));
         let studied = Category::ALL.into_iter().map(|category| {
             let study = StudyOptions { categories: vec![category], ..StudyOptions::default() };
             failures(&plan_study(scenarios(), &profile, &study).unwrap())
@@ -358,8 +314,7 @@ fn failures_of_samples_and_studies_vary_smoothly_with_the_time_step() {
 fn a_plan_has_no_more_samples_than_points() {
     let density = density(Parameterization::find(Category::CutIn, "1").unwrap(), false);
     let profile = Profile::load("paper").unwrap();
-    let mixture = density.mixture().unwrap();
-    let plan = |samples| plan_samples(&density, &mixture, &profile, &options(samples, SampleSource::Sobol));
+    let plan = |samples| plan_samples(&density, &profile, &options(samples, SampleSource::Sobol));
     assert!(plan(1 << 32).is_ok());
     assert!(plan((1 << 32) + 1).is_err());
 }

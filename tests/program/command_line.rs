@@ -512,10 +512,7 @@ fn threads_beyond_the_useful_number_are_not_started_and_said_once() {
     let fit =
         ["-q", "fit", "--synth-recordings", "2", "--categories", "cut-in", "--parameterizations", "2", "--config"];
     let density = dir.path().join("d.json");
-    assert_eq!(
-        code(&lanesweep(&[&fit[..], &["fit.valid_draws=1000", "--no-comparison", "--out", text(&density)]].concat())),
-        0
-    );
+    assert_eq!(code(&lanesweep(&[&fit[..], &["fit.valid_draws=1000", "--out", text(&density)]].concat())), 0);
     let estimate = |threads: &str| {
         let out = dir.path().join(threads);
         let flags =

@@ -78,7 +78,7 @@ fn smaller(line: &str) -> String {
         words[at + 1] = "300";
     }
     match words[1] {
-        "fit" => words.extend(["--no-comparison", "--config", "fit.valid_draws=1000"]),
+        "fit" => words.extend(["--config", "fit.valid_draws=1000"]),
         // One lane is little already.
         "verify" if !["--lane", "devices"].iter().any(|word| words.contains(word)) => {
             words.retain(|word| !matches!(*word, "--random-lanes" | "20000"));

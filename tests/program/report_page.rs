@@ -116,8 +116,7 @@ fn little_data_makes_a_readable_page_too() {
 fn sampling_runs_maps_and_comparisons_have_their_page() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    let fit =
-        ["fit", "--synth-recordings", "3", "--categories", "cut-in", "--parameterizations", "2", "--no-comparison"];
+    let fit = ["fit", "--synth-recordings", "3", "--categories", "cut-in", "--parameterizations", "2"];
     lanesweep(dir, &[&fit[..], &["--out", "d"]].concat());
     let sample = ["sample", "d/cut-in-2.json", "--backend", "cpu", "--samples", "3000"];
     lanesweep(dir, &[&sample[..], &["--thw", "1,0.6,0.2", "--out", "mc"]].concat());

@@ -47,7 +47,7 @@ fn shared() -> &'static Path {
         std::fs::create_dir_all(&dir).unwrap();
         std::fs::copy(common::golden("paper_sumo_01_02_scenarios.jsonl"), dir.join("scenarios.jsonl")).unwrap();
         let fit = ["-q", "fit", "--synth-recordings", "3", "--categories", "cut-in", "--parameterizations", "2"];
-        done(&dir, &[&fit[..], &["--no-comparison", "--out", "density.json"]].concat());
+        done(&dir, &[&fit[..], &["--out", "density.json"]].concat());
         for (name, run) in RUNS {
             done(&dir, &[run, &["--out", name]].concat());
         }

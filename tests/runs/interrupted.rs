@@ -41,7 +41,7 @@ fn estimates(dir: &Path) -> serde_json::Value {
 fn importance_sampling_that_is_killed_resumes_with_its_search_to_the_same_bits() {
     let dir = tempfile::tempdir().unwrap();
     let fit = "-q fit --synth-recordings 2 --categories cut-in --parameterizations 2 --config fit.valid_draws=1000 \
-               --no-comparison --out d.json";
+               --out d.json";
     done(dir.path(), &fit.split_whitespace().collect::<Vec<_>>());
     let run = [
         "-q",

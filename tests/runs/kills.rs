@@ -110,9 +110,9 @@ const VERBS: [Verb; 14] = [
         "fit",
         None,
         Some(
-            "fit --synth-recordings 2 --categories cut-in --parameterizations 2 --no-comparison --config fit.valid_draws=999 --out out",
+            "fit --synth-recordings 2 --categories cut-in --parameterizations 2 --config fit.valid_draws=999 --out out",
         ),
-        "fit --synth-recordings 3 --categories cut-in --no-comparison --config fit.valid_draws=1000 --out out",
+        "fit --synth-recordings 3 --categories cut-in --config fit.valid_draws=1000 --out out",
     ),
     verb("synth", Some("SYNTHETIC.txt"), None, "synth out --synth-recordings 3 --config generator.duration_s=30"),
     verb("tracks --convert", Some("converted.json"), None, "tracks recordings --convert out"),
@@ -180,7 +180,7 @@ fn put(dir: &Path, from: Option<&str>) {
 
 /// What the verbs read.
 fn furnish(dir: &Path) {
-    let fit = "fit --synth-recordings 2 --categories cut-in --parameterizations 2 --no-comparison";
+    let fit = "fit --synth-recordings 2 --categories cut-in --parameterizations 2";
     done(dir, &format!("{fit} --out d.json"));
     let plan = "study --synth-recordings 1 --config study.reference=true --dt 0.02 --plan-only";
     done(dir, &format!("{plan} --out plan"));

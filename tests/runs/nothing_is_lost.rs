@@ -92,8 +92,7 @@ fn what_an_earlier_run_left_in_the_folder_does_not_stay_beside_a_new_record() {
 fn files_that_no_record_lists_stay_whatever_they_are_called() {
     let dir = tempfile::tempdir().unwrap();
     let (density, out) = (dir.path().join("d.json"), dir.path().join("out"));
-    let fit =
-        ["fit", "--synth-recordings", "2", "--categories", "cut-in", "--parameterizations", "2", "--no-comparison"];
+    let fit = ["fit", "--synth-recordings", "2", "--categories", "cut-in", "--parameterizations", "2"];
     let run = |args: &[&str]| {
         let output = lanesweep(&[&["-q"], args].concat());
         assert!(output.status.success(), "{output:?}");
@@ -164,7 +163,7 @@ fn a_search_and_manual_pages_replace_no_file_of_the_users_and_follow_no_link() {
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| dir.path().join(name);
     let fit = ["-q", "fit", "--synth-recordings", "2", "--categories", "cut-in", "--parameterizations", "2"];
-    assert!(lanesweep(&[&fit[..], &["--no-comparison", "--out", text(&at("d.json"))]].concat()).status.success());
+    assert!(lanesweep(&[&fit[..], &["--out", text(&at("d.json"))]].concat()).status.success());
     let density = at("d.json");
     let sample = ["-q", "sample", text(&density), "--estimator", "is", "--samples", "1000"];
     let out = at("out");
@@ -195,7 +194,7 @@ fn lanes_of_a_run_without_its_density_say_how_to_get_it_back() {
     let at = |name: &str| dir.path().join(name);
     let (density, out) = (at("d.json"), at("out"));
     let fit = ["-q", "fit", "--synth-recordings", "2", "--categories", "cut-in", "--parameterizations", "2"];
-    assert!(lanesweep(&[&fit[..], &["--no-comparison", "--out", text(&density)]].concat()).status.success());
+    assert!(lanesweep(&[&fit[..], &["--out", text(&density)]].concat()).status.success());
     let sample =
         ["-q", "sample", text(&density), "--samples", "500", "--thw", "0.6", "--models", "FSM", "--out", text(&out)];
     assert!(lanesweep(&sample).status.success());
@@ -214,7 +213,7 @@ fn a_folder_from_somebody_else_makes_no_run_write_elsewhere() {
     let dir = tempfile::tempdir().unwrap();
     let (density, precious) = (dir.path().join("d.json"), dir.path().join("precious"));
     let fit = ["-q", "fit", "--synth-recordings", "2", "--categories", "cut-in", "--parameterizations", "2"];
-    assert!(lanesweep(&[&fit[..], &["--no-comparison", "--out", text(&density)]].concat()).status.success());
+    assert!(lanesweep(&[&fit[..], &["--out", text(&density)]].concat()).status.success());
     std::fs::write(&precious, "mine").unwrap();
     let scenarios = common::golden("paper_sumo_01_02_scenarios.jsonl");
     let study = ["-q", "study", "--scenarios", text(&scenarios), "--categories", "lvd"];
@@ -260,7 +259,7 @@ fn a_journal_replaces_no_file_of_the_users_follows_no_link_and_has_one_writer() 
     ran(&["synth", text(&at("data")), "--synth-recordings", "2"]);
     ran(&["mine", text(&at("data")), "--out", text(&scenarios)]);
     let fit = ["fit", "--scenarios", text(&scenarios), "--categories", "cut-in", "--parameterizations", "2"];
-    ran(&[&fit[..], &["--no-comparison", "--out", text(&density)]].concat());
+    ran(&[&fit[..], &["--out", text(&density)]].concat());
     std::fs::write(&precious, "mine").unwrap();
     let (data, shard) = (["--scenarios", text(&scenarios)], ["--shard", "0/2"]);
     let study = [&["-q", "study", "--categories", "lvd"], &data[..], &shard].concat();
@@ -407,7 +406,7 @@ fn the_label_of_made_up_data_is_in_the_data_and_follows_them_everywhere() {
         "--config",
         "fit.valid_draws=1000",
     ];
-    let fitted = ran(&[&["-q"], &fit[..], &["--no-comparison", "--format", "json", "--out", text(&density)]].concat());
+    let fitted = ran(&[&["-q"], &fit[..], &["--format", "json", "--out", text(&density)]].concat());
     assert!(is_synthetic(&fitted));
     let sampled = ["-q", "sample", text(&density), "--samples", "500", "--thw", "0.6", "--format", "json"];
     assert!(is_synthetic(&ran(&[&sampled[..], &["--out", text(&at("sampled"))]].concat())));

@@ -87,11 +87,11 @@ fn a_density_without_headways_cannot_draw_observed_ones() {
     let data = recordings(2);
     let facts = DataProvenance { data: "test".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
     let id = Parameterization::find(Category::CutIn, "2").unwrap();
-    let fit = FitOptions { representativeness: false, valid_draws: 1000, ..FitOptions::default() };
+    let fit = FitOptions { valid_draws: 1000, ..FitOptions::default() };
     let density = DensityModel::fit(id, &data.scenarios, &facts, &fit).unwrap().model;
     let options = SampleOptions::new(Estimator::CRUDE, 100, SampleHeadways::Each(vec![Headway::Observed]));
     let paper = Profile::load("paper").unwrap();
-    let error = plan_samples(&density, &density.mixture().unwrap(), &paper, &options).err().unwrap();
+    let error = plan_samples(&density, &paper, &options).err().unwrap();
     assert!(error.help().unwrap_or_default().contains("with_thw"), "{error}");
 }
 

@@ -15,7 +15,7 @@ pub const STUDY: [&str; 7] = ["-q", "study", "--synth-recordings", "2", "--publi
 
 pub fn density(dir: &Path) {
     let fit = ["-q", "fit", "--synth-recordings", "3", "--categories", "cut-in", "--parameterizations", "2"];
-    done(dir, &[&fit[..], &["--no-comparison", "--out", "densities"]].concat());
+    done(dir, &[&fit[..], &["--out", "densities"]].concat());
 }
 
 pub const SAMPLE: [&str; 9] =

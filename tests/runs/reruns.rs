@@ -167,7 +167,7 @@ fn sampled_lanes_are_the_runs_lanes_too() {
     let profile = Profile::load("paper").unwrap();
     let facts =
         DataProvenance { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
-    let options = FitOptions { representativeness: false, valid_draws: 1000, ..FitOptions::default() };
+    let options = FitOptions { valid_draws: 1000, ..FitOptions::default() };
     let mut lanes = 0;
     for (category, key) in [(Category::CutIn, "2"), (Category::CutOut, "b"), (Category::Lvd, "iv")] {
         let id = Parameterization::find(category, key).unwrap();
@@ -180,7 +180,7 @@ fn sampled_lanes_are_the_runs_lanes_too() {
                 SampleHeadways::Each(vec![Headway::ThwS(1.4), Headway::ThwS(0.4)]),
             )
         };
-        let plan = plan_samples(&density, &density.mixture().unwrap(), &profile, &options).unwrap();
+        let plan = plan_samples(&density, &profile, &options).unwrap();
         let outcomes = CpuBackend::lane_arithmetic().prepare(&plan).unwrap();
         let outcomes = { outcomes }.run(0..plan.unit_count(), Wanted::Outcomes).unwrap().outcomes;
         let runner = LaneRunner::<f32>::new(&plan);
@@ -231,7 +231,7 @@ fn a_lane_of_a_run_in_parts_can_be_looked_at_before_and_after_the_merge() {
     assert_eq!(trace("parts"), of_whole);
     // A sampling run's parts as well.
     let fit = ["-q", "fit", "--synth-recordings", "3", "--categories", "cut-in", "--parameterizations", "2"];
-    done(dir, &[&fit[..], &["--no-comparison", "--out", "densities"]].concat());
+    done(dir, &[&fit[..], &["--out", "densities"]].concat());
     let sample = ["-q", "sample", "densities/cut-in-2.json", "--samples", "3000", "--thw", "0.6", "--backend", "cpu"];
     done(dir, &[&sample[..], &["--out", "sampled"]].concat());
     done(dir, &[&sample[..], &["--out", "shard", "--shard", "1/2"]].concat());

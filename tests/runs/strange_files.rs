@@ -97,7 +97,7 @@ fn furnish(dir: &Path) {
     );
     assert_eq!(code, 0, "{said}");
     let fit = ["-q", "fit", "--synth-recordings", "3", "--categories", "cut-in", "--parameterizations", "2"];
-    let (code, said) = lanesweep(dir, &[&fit[..], &["--no-comparison", "--out", "density.json"]].concat());
+    let (code, said) = lanesweep(dir, &[&fit[..], &["--out", "density.json"]].concat());
     assert_eq!(code, 0, "{said}");
 }
 
@@ -242,7 +242,7 @@ fn plans_parts_journals_and_densities_that_are_zeros_or_cut_off_are_refused_with
         let (code, _, err) = program::limited(dir.path(), "ulimit -v 400000", &args);
         (code, program::flat(&err), started.elapsed())
     };
-    let fit = "fit --synth-recordings 2 --categories cut-in --parameterizations 2 --no-comparison --out d.json";
+    let fit = "fit --synth-recordings 2 --categories cut-in --parameterizations 2 --out d.json";
     let sample = "sample d.json --samples 1000 --thw 0.6 --models FSM --backend cpu --out out";
     let study = "study --synth-recordings 1 --categories cut-in --backend cpu --out study";
     for args in [fit, &format!("{sample} --shard 0/2"), &format!("{study} --shard 0/2")] {

@@ -277,21 +277,7 @@ fn lanes_of_a_study_and_of_a_sampling_run_are_those_of_simulate_in_binary32() {
     // What an earlier export left does not stand beside the new files.
     assert_eq!(std::fs::read_dir(root.join("x")).unwrap().count(), 4);
 
-    good(
-        root,
-        &[
-            "fit",
-            "--scenarios",
-            "s.jsonl",
-            "--categories",
-            "cut-in",
-            "--parameterizations",
-            "2",
-            "--no-comparison",
-            "--out",
-            "d",
-        ],
-    );
+    good(root, &["fit", "--scenarios", "s.jsonl", "--categories", "cut-in", "--parameterizations", "2", "--out", "d"]);
     good(root, &["sample", "d/cut-in-2.json", "--samples", "500", "--backend", "cpu", "--thw", "0.6", "--out", "run"]);
     assert_eq!(check(&["--from", "run", "--lane", "#0/2/0.6s/FSM", "--lane", "#7/2/0.6s/RSS"], "run"), 2);
     refused(root, &["export", "xosc", "--from", "run"], 2, "a run has many lanes");

@@ -51,7 +51,7 @@ fn a_study_prints_its_record_and_a_merged_one_the_same() {
 #[test]
 fn densities_and_samples_print_what_their_files_hold() {
     let dir = tempfile::tempdir().unwrap();
-    let fit: Vec<&str> = ["fit", "--categories", "cut-in", "--parameterizations", "2", "--out", "d", "--no-comparison"]
+    let fit: Vec<&str> = ["fit", "--categories", "cut-in", "--parameterizations", "2", "--out", "d"]
         .into_iter()
         .chain(SMALL.into_iter().take(4))
         .collect();

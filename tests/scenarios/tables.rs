@@ -117,7 +117,7 @@ fn a_study_gives_the_same_bytes_from_parquet_and_from_json_lines() {
     for file in ["s.jsonl", "s.parquet"] {
         let name = format!("{file}.json");
         let fit = ["-q", "fit", "--scenarios", file, "--categories", "lvd", "--parameterizations", "i", "--out", &name];
-        lanesweep(at, &[&fit[..], &["--no-comparison"]].concat());
+        lanesweep(at, &fit);
     }
 }
 
@@ -137,7 +137,7 @@ fn sampled_rows_are_the_same_in_every_format() {
     let at = dir.path();
     let lvd: Vec<Scenario> = synthetic().into_iter().filter(|s| s.category == Category::Lvd && s.kept).collect();
     let facts = DataProvenance { data: "made".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
-    let options = FitOptions { representativeness: false, valid_draws: 200, ..FitOptions::default() };
+    let options = FitOptions { valid_draws: 200, ..FitOptions::default() };
     let id = Parameterization::find(Category::Lvd, "i").unwrap();
     write_density(&at.join("d.json"), &DensityModel::fit(id, &lvd, &facts, &options).unwrap().model).unwrap();
     for (name, threads) in [("r.csv", "2"), ("r.jsonl", "2"), ("r.parquet", "2"), ("again.parquet", "1")] {

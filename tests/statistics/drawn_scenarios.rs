@@ -32,7 +32,7 @@ fn options(svd_lateral: SvdLateral) -> ParameterizationOptions {
 fn density(id: Parameterization, parameterization: ParameterizationOptions) -> DensityModel {
     let facts =
         DataProvenance { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
-    let fit = FitOptions { parameterization, representativeness: false, valid_draws: 20_000, ..FitOptions::default() };
+    let fit = FitOptions { parameterization, valid_draws: 20_000, ..FitOptions::default() };
     DensityModel::fit(id, scenarios(), &facts, &fit).unwrap().model
 }
 
@@ -54,7 +54,7 @@ fn every_draw_starts_and_ends_in_the_lanes_of_its_category_and_drives_at_a_speed
     for id in Parameterization::ALL.into_iter().filter(|id| id.coefficients().is_some()) {
         for svd_lateral in [SvdLateral::Signed, SvdLateral::Mirrored] {
             let density = density(id, options(svd_lateral));
-            let mixture = density.mixture().unwrap();
+            let mixture = density.kde.mixture().unwrap();
             let source = SampleSource::Random;
             let generator = generator_of(&density.space, &mixture, &density.sizes, &profile, source, 7).unwrap();
             for index in 0..2000 {
@@ -104,7 +104,7 @@ fn a_recorded_scenario_that_starts_in_the_ego_s_lane_keeps_its_kernel() {
     // The lane change began before the ego's data set.
     some[0].target.y.iter_mut().for_each(|y| *y *= 0.1);
     let facts = DataProvenance { data: String::new(), synthetic: true, scenarios_sha256: String::new(), driven: None };
-    let fit = FitOptions { representativeness: false, valid_draws: 1000, ..FitOptions::default() };
+    let fit = FitOptions { valid_draws: 1000, ..FitOptions::default() };
     let id = Parameterization::find(Category::CutIn, "7").unwrap();
     let fitted = DensityModel::fit(id, &some, &facts, &fit).unwrap();
     assert_eq!((fitted.left_out.len(), fitted.model.kde.points().len()), (0, some.len()));

@@ -26,7 +26,7 @@ fn density(id: Parameterization, scenarios: &[Scenario]) -> DensityModel {
     let facts =
         DataProvenance { data: "mined".to_owned(), synthetic: false, scenarios_sha256: String::new(), driven: None };
     // P_valid must be known better than the probabilities: it is in no interval.
-    let options = FitOptions { representativeness: false, valid_draws: 4_000_000, ..FitOptions::default() };
+    let options = FitOptions { valid_draws: 4_000_000, ..FitOptions::default() };
     DensityModel::fit(id, scenarios, &facts, &options).unwrap().model
 }
 

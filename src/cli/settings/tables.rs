@@ -10,7 +10,7 @@ use crate::run::sampling::SampleSource;
 use crate::run::score::ScoreOptions;
 use crate::scenario::parameterization::{ParameterizationOptions, SvdLateral};
 use crate::settings;
-use crate::stats::density::{BandwidthRule, DensityKind, FitOptions};
+use crate::stats::density::{BandwidthRule, FitOptions};
 use crate::traffic::mining::MiningOptions;
 use crate::traffic::trajectory::generator::GeneratorOptions;
 
@@ -112,14 +112,11 @@ settings! {
     #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
     #[serde(deny_unknown_fields, default)]
     pub(crate) struct FitSettings {
-        /// Form of the density. Intervals of a mixture or copula cover the draws alone, and they have no ratio to
-        /// recorded scenarios.
-        pub density: DensityKind = FitOptions::default().kind,
         /// Search interval of the bandwidth.
         pub bandwidth_rule: BandwidthRule = FitOptions::default().rule,
         /// Sign of the lateral series of densities and of the replays that are compared with them.
         pub svd_lateral: SvdLateral = FitOptions::default().parameterization.svd_lateral,
-        /// Seed of P_valid and of the splits for M.
+        /// Seed of P_valid.
         pub seed: u64 = FitOptions::default().seed,
         /// Number of draws for P_valid; with 10^9 its relative standard error is 0.01 % if it is 0.1.
         #[schemars(range(min = 1, max = 1_000_000_000))]

@@ -1,7 +1,7 @@
-//! Sample index → point: a Gaussian mixture drawn with counter-based random words or with scrambled Sobol points and
-//! then transformed parameter by parameter, or a table of given points. Twin: `shaders/shared/points.wgsl`.
+//! Sample index → point: a Gaussian mixture drawn with counter-based random words or with scrambled Sobol points, or a
+//! table of given points. Twin: `shaders/shared/points.wgsl`.
 
-use crate::random::{AliasTable, KNOT_LIMIT, PIECES, SOBOL_POINTS, Sobol, Stream, choose, standard_normal};
+use crate::random::{AliasTable, SOBOL_POINTS, Sobol, Stream, choose, standard_normal};
 
 /// Maximum number of parameters of a point.
 pub const MAX_PARAMETERS: usize = 14;
@@ -55,9 +55,6 @@ pub struct Points {
     pub factor_of: Vec<u32>,
     /// Factors: `dimensions`² each, row by row, zeros above the diagonal.
     pub factors: Vec<f32>,
-    /// Value at each knot of a transformation, `PIECES` + 1 per parameter; empty
-    /// if draws of the mixture are points.
-    pub knots: Vec<f32>,
 }
 
 impl Points {
@@ -103,23 +100,16 @@ impl Points {
                 largest * factor.iter().map(|number| f64::from(number.abs())).sum::<f64>()
             }
         };
-        let knots = self.knots.chunks_exact(PIECES + 1).nth(parameter);
         let mut range = [f64::INFINITY, f64::NEG_INFINITY];
         for component in 0..self.factor_of.len() {
             let mean = f64::from(self.means[component * d + parameter]);
-            for end in [mean - spread(component), mean + spread(component)] {
-                let value = knots.map_or(end, |knots| f64::from(transformed(knots, end as f32)));
-                range = [range[0].min(value), range[1].max(value)];
-            }
+            range = [range[0].min(mean - spread(component)), range[1].max(mean + spread(component))];
         }
         range
     }
 
-    /// The kernel of draw `tries` (from 1) of an index. `None` for given points and for components that are no kernels.
+    /// The kernel of draw `tries` (from 1) of an index. `None` for given points.
     pub fn component(&self, index: u64, tries: u32) -> Option<u32> {
-        if !self.knots.is_empty() {
-            return None;
-        }
         let [a, b] = match &self.source {
             PointSource::Random(stream) => {
                 let [a, b, ..] = stream.words(index, tries.checked_sub(1)? * BLOCKS);
@@ -179,27 +169,8 @@ impl Points {
             }
             values[j] = value;
         }
-        for (value, knots) in values.iter_mut().zip(self.knots.chunks_exact(PIECES + 1)) {
-            *value = transformed(knots, *value);
-        }
         values
     }
-}
-
-/// Number of knots per unit of z.
-const KNOTS_PER_UNIT: f32 = PIECES as f32 / (2.0 * KNOT_LIMIT as f32);
-
-/// The linear piece between two knots; the outermost pieces continue.
-#[inline]
-fn transformed(knots: &[f32], z: f32) -> f32 {
-    let position = (z + KNOT_LIMIT as f32) * KNOTS_PER_UNIT;
-    let piece = match position {
-        _ if position >= (PIECES - 1) as f32 => PIECES - 1,
-        _ if position >= 1.0 => position as usize,
-        _ => 0,
-    };
-    let (left, right) = (knots[piece], knots[piece + 1]);
-    left + (right - left) * (position - piece as f32)
 }
 
 #[cfg(test)]
@@ -208,7 +179,7 @@ mod tests {
 
     fn points(source: PointSource) -> Points {
         let (means, factor_of) = (vec![1.0, 2.0, 3.0], vec![0, 0, 0]);
-        Points { source, dimensions: 1, weights: None, means, factor_of, factors: vec![1.0], knots: Vec::new() }
+        Points { source, dimensions: 1, weights: None, means, factor_of, factors: vec![1.0] }
     }
 
     #[test]
@@ -224,23 +195,19 @@ mod tests {
     #[test]
     fn no_draw_leaves_the_range_of_its_parameter() {
         let stream = PointSource::Random(Stream { seed: 7, purpose: 0 });
-        let two = |knots: Vec<f32>| Points {
+        let points = Points {
             dimensions: 2,
             means: vec![1.0, -2.0, 3.0, 5.0],
             factor_of: vec![0, 1],
             factors: vec![0.5, 0.0, -0.25, 1.0, 2.0, 0.0, 0.0, 0.125],
-            knots,
-            ..points(stream.clone())
+            ..points(stream)
         };
-        let rising: Vec<f32> = (0..2 * (PIECES + 1)).map(|k| (k % (PIECES + 1)) as f32 * 0.01).collect();
-        for points in [two(Vec::new()), two(rising)] {
-            let ranges = [points.range(0), points.range(1)];
-            assert!(ranges.iter().all(|[low, high]| high - low < 30.0), "{ranges:?}");
-            for index in 0..20_000 {
-                let values = points.attempt(index, 0);
-                for (value, [low, high]) in values.iter().zip(ranges) {
-                    assert!(f64::from(*value) >= low - 1e-5 && f64::from(*value) <= high + 1e-5, "{values:?}");
-                }
+        let ranges = [points.range(0), points.range(1)];
+        assert!(ranges.iter().all(|[low, high]| high - low < 30.0), "{ranges:?}");
+        for index in 0..20_000 {
+            let values = points.attempt(index, 0);
+            for (value, [low, high]) in values.iter().zip(ranges) {
+                assert!(f64::from(*value) >= low - 1e-5 && f64::from(*value) <= high + 1e-5, "{values:?}");
             }
         }
     }

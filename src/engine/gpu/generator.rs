@@ -53,14 +53,11 @@ impl GeneratorSetup {
         numbers.extend(bits(&points.factors));
         let first_factor_of = numbers.len() as u32;
         numbers.extend(&points.factor_of);
-        let first_knot = numbers.len() as u32;
-        numbers.extend(bits(&points.knots));
         let mut generation = Generation {
             components: points.components(),
             first_mean,
             first_factor,
             first_factor_of,
-            first_knot,
             stride: generator.case_instants(),
             ..Generation::default()
         };

@@ -178,8 +178,6 @@ pub struct Generation {
     pub first_factor: u32,
     /// Offset of the components' factor indices.
     pub first_factor_of: u32,
-    /// Offset of the transformation's knots.
-    pub first_knot: u32,
     /// Entries of each sample in the table of instants.
     pub stride: u32,
 }

@@ -9,7 +9,7 @@ use crate::engine::{ENGINE_VERSION, Headway, LanePlan};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::parts::{PLAN_FILE, RUN_PLAN_FILE, kind_of};
-use crate::run::sampling::{Estimator, SampleHeadways, SampleOptions, SampleSource, mixture_of, plan_samples};
+use crate::run::sampling::{Estimator, SampleHeadways, SampleOptions, SampleSource, plan_samples};
 use crate::run::study::Study;
 use crate::stats::density::{DensityModel, read_density};
 use crate::support::input_file::{MAX_TABLE_BYTES, read_json};
@@ -25,8 +25,6 @@ pub(super) fn sample_of(dir: &Path) -> Result<(LanePlan, DensityModel)> {
         engine: Option<u64>,
         estimator: String,
         points: String,
-        #[serde(default)]
-        given: Vec<(String, f64)>,
         samples: u64,
         seed: u64,
         models: Vec<ModelId>,
@@ -70,7 +68,7 @@ pub(super) fn sample_of(dir: &Path) -> Result<(LanePlan, DensityModel)> {
         models: run.models,
         ..SampleOptions::new(Estimator::CRUDE, run.samples, headways)
     };
-    let plan = plan_samples(&density, &mixture_of(&density, &run.given)?, &run.profile, &options)?;
+    let plan = plan_samples(&density, &run.profile, &options)?;
     if run.plan_sha256.as_deref() != Some(plan.hash()) {
         return Err(wrong("its plan does not match the density and the profile beside it".to_owned()));
     }

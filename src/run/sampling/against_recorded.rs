@@ -66,13 +66,12 @@ impl Sample {
     /// Those of the lanes of S and S'.
     pub(super) fn against_recorded(&self, mut result: SampleResult) -> Result<SampleResult> {
         let (density, options) = (&self.density, &self.options);
-        // If the density draws the headway, S starts from the recorded gaps. A conditional density has no recorded
-        // counterpart.
+        // If the density draws the headway, S starts from the recorded gaps.
         let headways = match &options.headways {
             SampleHeadways::Each(headways) => headways.clone(),
             SampleHeadways::Sampled => vec![Headway::Observed],
         };
-        let is_comparable = options.given.is_empty() && !density.scenarios.is_empty();
+        let is_comparable = !density.scenarios.is_empty();
         let replayed = is_comparable.then(|| replay(density, &self.profile, &options.models, &headways));
         let Some([recorded, replayed]) = replayed.transpose()?.flatten() else {
             result.rows.iter_mut().for_each(|row| row.estimate.trust.warn_if(true, Warning::NotCompared));

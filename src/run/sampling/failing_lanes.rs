@@ -88,10 +88,7 @@ impl Sample {
                     let rows = asked.iter().zip(&result.rows).filter(|(asked, _)| is_of(asked));
                     rows.map(|(_, row)| row.estimate.failures).sum()
                 };
-                let draw = |index| {
-                    let point = weighted.draws.draw(&nominal, &weighted.proposal, index)?;
-                    Some(self.density.values(&point))
-                };
+                let draw = |index| weighted.draws.draw(&nominal, &weighted.proposal, index);
                 let all = 0..weighted.draws.draws;
                 self.find(Missing::new(models, limit, counted), &[all], executor, each, |_| draw)
             }

@@ -65,7 +65,6 @@ pub fn generator_of(
         means: Vec::with_capacity(n * d),
         factor_of: Vec::with_capacity(n),
         factors: Vec::new(),
-        knots: Vec::new(),
     };
     for component in 0..n {
         points.means.extend(mixture.mean(component).iter().map(|&v| rounded(v)));
@@ -102,7 +101,6 @@ pub fn generator_of_points(
         means: points.iter().flatten().map(|&v| rounded(v)).collect(),
         factor_of: vec![0; points.len()],
         factors: vec![0.0; d * d],
-        knots: Vec::new(),
     };
     assembled(space, points, sizes, profile)
 }

@@ -11,7 +11,7 @@ use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::random::Stream;
-use crate::stats::density::{DensityKind, DensityModel, Mixture};
+use crate::stats::density::{DensityModel, Mixture};
 use crate::stats::estimate::{Density, Failure, KernelShares, LimitState, Truncated, kernel_shares};
 
 /// Value far from any failure: the ego never closed in.
@@ -44,8 +44,9 @@ pub fn limit_state(profile: &Profile, criterion: Criterion, outcome: &Outcome<f6
     if failed { value.min(0.0) } else { value.max(MIN_UNFAILED) }
 }
 
-/// Lanes as a limit state with several questions, over the points of the density's [mixture](DensityModel::mixture). Each has three guides: the [limit state](limit_state()), the smallest
-/// gap, and the reciprocal of the largest BTN. A creeping approach has a small TTC without danger; the others tell.
+/// Lanes as a limit state with several questions, over the points of a density. Each has three guides: the [limit
+/// state](limit_state()), the smallest gap, and the reciprocal of the largest BTN. A creeping approach has a small TTC
+/// without danger; the others tell.
 pub struct LaneLimitState<'a> {
     density: &'a DensityModel,
     profile: &'a Profile,
@@ -100,8 +101,7 @@ impl LimitState for LaneLimitState<'_> {
     }
 
     fn evaluate(&self, points: &[Vec<f64>]) -> Result<Vec<f64>> {
-        let values: Vec<Vec<f64>> = points.iter().map(|point| self.density.values(point)).collect();
-        let plan = plan_points(self.density, &values, self.profile, &self.models, &self.headways)?;
+        let plan = plan_points(self.density, points, self.profile, &self.models, &self.headways)?;
         let lanes = self.models.len() * plan.headways.len();
         let mut values = Vec::with_capacity(3 * points.len() * self.questions.len());
         self.executor.sweep(&plan, 0..plan.unit_count(), Wanted::Outcomes, |chunk| {
@@ -123,9 +123,6 @@ impl LimitState for LaneLimitState<'_> {
         let plan = plan_draws(self.density, stream, self.profile, indices.end, &self.models, &self.headways)?;
         let lanes = self.models.len() * plan.headways.len();
         let Some(generator) = plan.generator() else { return Ok(Vec::new()) };
-        // The points before their transformation, over which the density is a mixture.
-        let mut latent = generator.points.clone();
-        latent.knots.clear();
         let mut failures = Vec::new();
         self.executor.sweep(&plan, indices, Wanted::Verdicts, |chunk| {
             for (index, verdicts) in chunk.units.clone().zip(chunk.verdicts.chunks(lanes)) {
@@ -137,8 +134,8 @@ impl LimitState for LaneLimitState<'_> {
                 if drawn.is_void() {
                     continue;
                 }
-                let values = latent.attempt(index, drawn.tries - 1);
-                let point = values[..latent.dimensions].iter().map(|value| f64::from(*value)).collect();
+                let values = &drawn.values[..generator.points.dimensions];
+                let point = values.iter().map(|value| f64::from(*value)).collect();
                 failures.push(Failure { index, point, fails: self.questions.iter().map(failed).collect() });
             }
             Ok(())
@@ -147,17 +144,16 @@ impl LimitState for LaneLimitState<'_> {
     }
 }
 
-/// The density of a density file, truncated to its valid region, over the points of its [mixture](DensityModel::mixture).
+/// The density of a density file, truncated to its valid region.
 ///
 /// # Errors
 /// As [`Truncated::with_validity`].
 pub fn truncated(density: &DensityModel) -> Result<Truncated<impl Fn(&[f64]) -> bool + Sync + '_>> {
-    let is_valid = |point: &[f64]| density.space.is_valid(&density.values(point));
-    Truncated::with_validity(density.mixture()?, is_valid, density.valid.estimate)
+    Truncated::with_validity(density.kde.mixture()?, |point| density.space.is_valid(point), density.valid.estimate)
 }
 
 /// Determines which scenarios failures come from, by draws of a proposal and about `crude` draws of the density. `None`
-/// for a question without failing draws, and if the density is not over kernels.
+/// for a question without failing draws.
 ///
 /// # Errors
 /// Those of the lanes.
@@ -166,9 +162,6 @@ pub(crate) fn scenario_shares(
     proposal: &Mixture,
     (seed, crude): (u64, u64),
 ) -> Result<Vec<Option<KernelShares>>> {
-    if lanes.density.kind() != DensityKind::Kernel {
-        return Ok(vec![None; lanes.questions()]);
-    }
     let nominal = truncated(lanes.density)?;
     kernel_shares(nominal.kernels(), &nominal, proposal, lanes, (seed, crude))
 }

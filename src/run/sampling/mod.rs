@@ -25,8 +25,7 @@ pub use estimate_rows::{EstimateRow, RecordedRatios, Risk, RiskRate};
 pub use failing_lanes::FailingLane;
 pub use generator::{SAMPLE_PURPOSE, SampleSource, generator_of, generator_of_points};
 pub use limit_state::{LaneLimitState, limit_state, truncated};
-pub(crate) use plan::mixture_of;
-pub use plan::{Conditional, conditional, plan_points, plan_samples};
+pub use plan::{plan_points, plan_samples};
 use plan_file::{KIND, SEARCH_FILE};
 pub use proposal_file::{proposal_from_text, proposal_text, read_proposal};
 pub use result::SampleResult;
@@ -40,7 +39,7 @@ use std::path::Path;
 use crate::engine::{Executor, LanePlan};
 use crate::model::profile::Profile;
 use crate::run::parts::PLAN_FILE;
-use crate::stats::density::{DensityModel, Exposure, Mixture};
+use crate::stats::density::{DensityModel, Mixture};
 use crate::stats::estimate::{Importance, Search, SearchRun};
 use crate::{Error, Result};
 
@@ -64,7 +63,7 @@ use crate::{Error, Result};
 /// # let recordings = GeneratorOptions { recordings: 2, ..GeneratorOptions::default() };
 /// # let scenarios = mine_generated(&recordings, &MiningOptions::default(), || Ok(()))?.scenarios;
 /// # let facts = DataProvenance { data: "synthetic".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
-/// # let options = FitOptions { representativeness: false, valid_draws: 100, ..FitOptions::default() };
+/// # let options = FitOptions { valid_draws: 100, ..FitOptions::default() };
 /// # let id = Parameterization::find(Category::CutIn, "2").unwrap();
 /// # let density = DensityModel::fit(id, &scenarios, &facts, &options)?.model;
 /// # let folder = tempfile::tempdir().unwrap();
@@ -125,10 +124,7 @@ impl Sample {
     /// [`Error::Usage`] for options that contradict one another or the density.
     pub fn plan(density: DensityModel, profile: &Profile, options: &SampleOptions) -> Result<Sample> {
         let kind = match &options.estimator {
-            Estimator::Crude { .. } => {
-                let mixture = mixture_of(&density, &options.given)?;
-                SampleKind::Crude(Box::new(plan_samples(&density, &mixture, profile, options)?))
-            }
+            Estimator::Crude { .. } => SampleKind::Crude(Box::new(plan_samples(&density, profile, options)?)),
             Estimator::Search(search) => SampleKind::Search(*search),
             Estimator::Given { proposal: Some(proposal), crude_per_draw } => {
                 let (proposal, crude_per_draw) = (proposal.clone(), *crude_per_draw);
@@ -188,12 +184,6 @@ impl Sample {
         };
         let weighted = || drawn.saturating_mul(self.lanes_per_sample());
         self.lane_plan().map_or_else(weighted, LanePlan::lane_count)
-    }
-
-    /// The exposure for the risks; `None` for a conditional density, because the frequency of such scenarios is
-    /// unknown.
-    fn exposure(&self) -> Option<&Exposure> {
-        self.density.exposure.as_ref().filter(|_| self.options.given.is_empty())
     }
 
     /// Finds the proposal if a search is needed, unless the folder has that of an interrupted run or of another shard. A

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::plan::{mixture_of, plan_samples};
+use super::plan::plan_samples;
 use super::proposal_file::{proposal_from_text, proposal_text};
 use super::sample_options::{Estimator, SampleOptions};
 use super::{Sample, SampleKind, Weighted};
@@ -83,9 +83,7 @@ impl Sample {
         let fits = search.as_ref().is_none_or(|search| search.questions.len() == options.asked().len());
         let kind = match &options.estimator {
             Estimator::Crude { .. } => {
-                let planned = mixture_of(&density, &options.given)
-                    .and_then(|mixture| plan_samples(&density, &mixture, &profile, &options));
-                let plan = planned.map_err(|error| match error {
+                let plan = plan_samples(&density, &profile, &options).map_err(|error| match error {
                     Error::Usage { problem, .. } => wrong(&problem),
                     other => other,
                 })?;

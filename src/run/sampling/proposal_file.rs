@@ -5,7 +5,7 @@ use std::path::Path;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-use crate::stats::density::{DensityKind, DensityModel, MAX_FILE_BYTES, Mixture};
+use crate::stats::density::{DensityModel, MAX_FILE_BYTES, Mixture};
 use crate::support::input_file;
 use crate::{Error, Place, Result};
 
@@ -22,9 +22,9 @@ struct File {
     parameters: Vec<String>,
     /// SHA-256 of the density that it was made for.
     density_sha256: String,
-    /// Form of that density: the proposal is over the points of its mixture.
-    #[serde(default)]
-    density_form: DensityKind,
+    /// In files of earlier versions: the form of that density.
+    #[serde(default, skip_serializing)]
+    density_form: Option<String>,
     weights: Vec<f64>,
     means: Vec<Vec<f64>>,
     /// Lower-triangular factors of the covariances, row by row, one per component.
@@ -45,7 +45,7 @@ pub fn proposal_text(density: &DensityModel, proposal: &Mixture) -> Result<Strin
         lanesweep_proposal: VERSION,
         parameters: names(density),
         density_sha256: density.content_sha256()?,
-        density_form: density.kind(),
+        density_form: None,
         weights: proposal.weights().to_vec(),
         means: components.clone().map(|k| proposal.mean(k).to_vec()).collect(),
         factors: components.map(|k| proposal.factor(k).transpose().as_slice().to_vec()).collect(),
@@ -86,15 +86,8 @@ pub fn proposal_from_text(text: &[u8], density: &DensityModel, place: &Place) ->
             format!("it is over {}, the density over {}", file.parameters.join(", "), names(density).join(", "));
         return Err(wrong(problem));
     }
-    // Kernels of any data are over the parameters themselves, other forms over their own transformation of them.
-    let is_other = density.kind() != DensityKind::Kernel && density.content_sha256()? != file.density_sha256;
-    if file.density_form != density.kind() || is_other {
-        let of = file.density_form.key();
-        return Err(Error::input(
-            place.clone(),
-            format!("it was made for another density, of form {of}, and is over other coordinates"),
-            "let importance sampling search a proposal of this density",
-        ));
+    if let Some(form) = file.density_form.filter(|form| form != "kernel") {
+        return Err(wrong(format!("it was made for a density of form {form}, and is over other coordinates")));
     }
     let (n, d) = (file.means.len(), file.parameters.len());
     if file.factors.iter().any(|factor| factor.len() != d * d) {

@@ -95,8 +95,6 @@ pub struct SampleOptions {
     pub seed: u64,
     /// Level of the intervals.
     pub level: f64,
-    /// Given parameters with their values (crude).
-    pub given: Vec<(String, f64)>,
 }
 
 impl SampleOptions {
@@ -112,7 +110,6 @@ impl SampleOptions {
             questions: Vec::new(),
             seed: 157,
             level: 0.95,
-            given: Vec::new(),
         }
     }
 

@@ -132,12 +132,12 @@ impl Job for CrudeJob<'_> {
         if ledger.units().is_empty() {
             return Ok(Computed::whole(SweepSummary::default()));
         }
-        let (options, exposure) = (&self.sample.options, self.sample.exposure());
+        let (options, exposure) = (&self.sample.options, self.sample.density.exposure.as_ref());
         sample_into(self.plan, ledger, executor, options, exposure, each)
     }
 
     fn result(&self, counts: Vec<SampleTally>, computed: Computed, place: Place) -> Result<SampleResult> {
-        let (options, exposure) = (&self.sample.options, self.sample.exposure());
+        let (options, exposure) = (&self.sample.options, self.sample.density.exposure.as_ref());
         let mut run = crude_of_segments(self.plan, counts, options, exposure, &computed)?;
         if options.stop.is_fixed() && run.tally.samples() != self.unit_count() {
             let problem = "the parts do not hold every sample that their names stand for";

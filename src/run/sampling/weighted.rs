@@ -38,7 +38,7 @@ fn chunk_samples(step_cap: u32, lanes: u64, kernels: u64) -> u64 {
 impl Sample {
     /// Number of samples between two updates of the journal.
     pub(crate) fn chunk_samples(&self, crude_per_draw: u64) -> u64 {
-        let kernels = self.density.components();
+        let kernels = self.density.kde.points().len();
         chunk_samples(self.profile.step_cap(), self.lanes_per_sample() * (1 + crude_per_draw), kernels as u64)
     }
 
@@ -111,7 +111,7 @@ impl Sample {
         tally: Option<WeightedTally>,
         place: Place,
     ) -> Result<SampleResult> {
-        let (options, exposure) = (&self.options, self.exposure());
+        let (options, exposure) = (&self.options, self.density.exposure.as_ref());
         let all = 0..self.samples();
         let Some(tally) = tally.filter(|tally| tally.covered().as_slice() == std::slice::from_ref(&all)) else {
             let problem = "the parts do not hold every sample";

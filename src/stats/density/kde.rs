@@ -89,11 +89,6 @@ impl Kde {
         &self.bandwidth
     }
 
-    /// Number of parameters.
-    pub(crate) fn dimensions(&self) -> usize {
-        self.scale.len()
-    }
-
     /// h s_j: standard deviation of a kernel, one per parameter, in its unit.
     pub fn spread(&self) -> Vec<f64> {
         self.scale.iter().map(|s| s * self.bandwidth.value).collect()

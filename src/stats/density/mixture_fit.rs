@@ -1,5 +1,5 @@
 //! Weighted maximum likelihood of a Gaussian mixture by expectation maximisation (Dempster, Laird and Rubin 1977), for
-//! proposals and for densities: few components, full covariances.
+//! proposals: few components, full covariances.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -17,36 +17,24 @@ const MIN_WEIGHT: f64 = 1e-3;
 /// Added to every variance, as a fraction of the points' variance of that parameter.
 const JITTER: f64 = 1e-6;
 
-/// Options of a fit.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct FitOptions {
-    /// Maximum number of components, ≥ 1; fewer where the points do not carry them.
-    pub components: usize,
-    /// Choose among 1, 2, 3, 4, 6, 8, 12, … up to `components` by the likelihood of held-out points: so many parts of the
-    /// points are predicted by fits to the others. Below 2 there is no choice: exactly `components`.
-    pub folds: usize,
-    /// Maximum number of iterations for each number of components.
-    pub iterations: usize,
-    /// End when the mean log-likelihood grows by less than this in an iteration.
-    pub tolerance: f64,
-    /// Seed of the first centres.
-    pub seed: u64,
-}
-
-impl Default for FitOptions {
-    fn default() -> Self {
-        FitOptions { components: 4, folds: 2, iterations: 50, tolerance: 1e-3, seed: 0 }
-    }
-}
+/// Parts of the points of which each is held out once, to choose the number of components.
+const FOLDS: usize = 2;
+/// Maximum number of iterations for each number of components.
+const ITERATIONS: usize = 50;
+/// Iterations end when the mean log-likelihood grows by less than this.
+const TOLERANCE: f64 = 1e-3;
 
 impl Mixture {
     /// The mixture that maximizes the weighted log-likelihood Σ w ln q(x). Covariances are regularised: each is shrunk
     /// towards the covariance of all points by (d + 1)/(d + 1 + its effective sample size), so that few points never
     /// give a degenerate covariance.
     ///
+    /// The likelihood of held-out points chooses the number of components among 1, 2, 3, 4, 6, 8, 12, … up to
+    /// `components`. `seed` is that of the first centres.
+    ///
     /// # Errors
     /// [`Error::Usage`] if there is no point, shapes differ, or weights are negative, not finite or all zero.
-    pub(crate) fn fit(points: &[Vec<f64>], weights: &[f64], options: &FitOptions) -> Result<Mixture> {
+    pub(crate) fn fit(points: &[Vec<f64>], weights: &[f64], components: usize, seed: u64) -> Result<Mixture> {
         let total: f64 = weights.iter().sum();
         let d = points.first().map_or(0, Vec::len);
         let well_formed = d > 0
@@ -55,19 +43,18 @@ impl Mixture {
             && weights.iter().all(|w| *w >= 0.0)
             && total.is_finite()
             && total > 0.0;
-        if !well_formed || options.components == 0 {
+        if !well_formed {
             return Err(Error::usage(
                 Place::item("fit of a mixture"),
                 format!("{} points of {d} parameters with weights that sum to {total} cannot be fitted", points.len()),
-                "give finite points of one length, weights that are not all zero, and at least one component",
+                "give finite points of one length, and weights that are not all zero",
             ));
         }
         // Points of weight 0 have no effect.
         let kept: Vec<(&[f64], f64)> =
             points.iter().zip(weights).filter(|(_, w)| **w > 0.0).map(|(p, w)| (p.as_slice(), w / total)).collect();
         let sample = Weighted::of(kept, d);
-        let components = if options.folds > 1 { sample.chosen(options)? } else { options.components };
-        sample.expectation_maximisation(components, options).map(|fit| fit.0)
+        sample.expectation_maximisation(sample.chosen(components, seed)?, seed)
     }
 }
 
@@ -97,24 +84,24 @@ impl<'a> Weighted<'a> {
     }
 
     /// The number of components with the largest held-out likelihood; the smaller one of almost equal candidates.
-    fn chosen(&self, options: &FitOptions) -> Result<usize> {
+    fn chosen(&self, components: usize, seed: u64) -> Result<usize> {
         // A component takes its weight, mean and covariance from at least d + 1 points.
         let max = (self.effective / (self.d as f64 + 1.0)).floor().max(1.0) as usize;
         let powers = (0..usize::BITS - 2).flat_map(|bit| [1 << bit, 3 << bit]);
-        let mut candidates: Vec<usize> = powers.filter(|k| *k <= options.components.min(max)).collect();
+        let mut candidates: Vec<usize> = powers.filter(|k| *k <= components.min(max)).collect();
         candidates.sort_unstable();
         if candidates.len() < 2 {
             return Ok(1);
         }
         let part = |fold: usize, is_held_out: bool| {
-            let own = self.points.iter().enumerate().filter(|(at, _)| (at % options.folds == fold) == is_held_out);
+            let own = self.points.iter().enumerate().filter(|(at, _)| (at % FOLDS == fold) == is_held_out);
             let own: Vec<(&[f64], f64)> = own.map(|(_, point)| *point).collect();
             let total: f64 = own.iter().map(|(_, weight)| weight).sum();
             Weighted::of(own.into_iter().map(|(point, weight)| (point, weight / total)).collect(), self.d)
         };
-        let parts: Vec<[Weighted; 2]> = (0..options.folds).map(|fold| [part(fold, false), part(fold, true)]).collect();
+        let parts: Vec<[Weighted; 2]> = (0..FOLDS).map(|fold| [part(fold, false), part(fold, true)]).collect();
         let held_out = |[fitted, held_out]: &[Weighted; 2], components: usize| -> Result<f64> {
-            let mixture = fitted.expectation_maximisation(components, options)?.0;
+            let mixture = fitted.expectation_maximisation(components, seed)?;
             Ok(held_out.points.iter().map(|(point, weight)| weight * mixture.log_density(point)).sum::<f64>())
         };
         let (mut best, mut worse) = ((f64::NEG_INFINITY, 1), 0);
@@ -182,17 +169,17 @@ impl<'a> Weighted<'a> {
         assignment
     }
 
-    /// The fitted mixture and its mean log-likelihood.
-    fn expectation_maximisation(&self, components: usize, options: &FitOptions) -> Result<(Mixture, f64)> {
+    /// The fitted mixture.
+    fn expectation_maximisation(&self, components: usize, seed: u64) -> Result<Mixture> {
         let n = self.points.len();
         let mut responsibilities = vec![vec![0.0; n]; components];
-        for (i, own) in self.first_assignment(components, options.seed).into_iter().enumerate() {
+        for (i, own) in self.first_assignment(components, seed).into_iter().enumerate() {
             responsibilities[own][i] = 1.0;
         }
         let mut mixture = self.maximise(&responsibilities)?;
         let mut last = f64::NEG_INFINITY;
         let mut parts = Vec::new();
-        for _ in 0..options.iterations {
+        for _ in 0..ITERATIONS {
             responsibilities = vec![vec![0.0; n]; mixture.weights().len()];
             let mut log_likelihood = 0.0;
             for (i, (point, weight)) in self.points.iter().enumerate() {
@@ -203,13 +190,13 @@ impl<'a> Weighted<'a> {
                     responsibility[i] = libm::exp(part - top) / sum;
                 }
             }
-            if log_likelihood - last < options.tolerance {
-                return Ok((mixture, log_likelihood));
+            if log_likelihood - last < TOLERANCE {
+                break;
             }
             last = log_likelihood;
             mixture = self.maximise(&responsibilities)?;
         }
-        Ok((mixture, last))
+        Ok(mixture)
     }
 
     /// Weights, means and factors for given responsibilities.
@@ -250,7 +237,7 @@ mod tests {
     fn a_fit_finds_the_number_the_places_and_the_shapes_of_components() {
         let stream = Stream { seed: 1, purpose: 2 };
         let points: Vec<Vec<f64>> = (0..4000).map(|i| three().draw(&stream, i, 0)).collect();
-        let fitted = Mixture::fit(&points, &vec![2.5; 4000], &FitOptions::default()).expect("a fit");
+        let fitted = Mixture::fit(&points, &vec![2.5; 4000], 4, 0).expect("a fit");
         assert_eq!(fitted.weights().len(), 3);
         for k in 0..3 {
             let truth = three();
@@ -268,8 +255,7 @@ mod tests {
         let stream = Stream { seed: 4, purpose: 2 };
         let points: Vec<Vec<f64>> = (0..500).map(|i| three().draw(&stream, i, 0)).collect();
         let weights: Vec<f64> = (0..500).map(|i| f64::from(1 + i % 3)).collect();
-        let one = FitOptions { components: 1, folds: 0, ..FitOptions::default() };
-        let weighted = Mixture::fit(&points, &weights, &one).unwrap();
+        let weighted = Mixture::fit(&points, &weights, 1, 0).unwrap();
         let total: f64 = weights.iter().sum();
         let mean: f64 = points.iter().zip(&weights).map(|(p, w)| p[0] * w).sum::<f64>() / total;
         assert!((weighted.mean(0)[0] - mean).abs() < 1e-12);
@@ -277,11 +263,11 @@ mod tests {
 
     #[test]
     fn one_point_or_a_parameter_without_spread_still_gives_a_density() {
-        let fitted = Mixture::fit(&[vec![3.0, 4.0]], &[1.0], &FitOptions::default()).unwrap();
+        let fitted = Mixture::fit(&[vec![3.0, 4.0]], &[1.0], 4, 0).unwrap();
         assert!(fitted.log_density(&[3.0, 4.0]).is_finite());
         let flat: Vec<Vec<f64>> = (0..50).map(|i| vec![f64::from(i), 7.0]).collect();
-        assert!(Mixture::fit(&flat, &[1.0; 50], &FitOptions::default()).is_ok());
-        assert!(Mixture::fit(&flat, &[0.0; 50], &FitOptions::default()).is_err());
-        assert!(Mixture::fit(&[], &[], &FitOptions::default()).is_err());
+        assert!(Mixture::fit(&flat, &[1.0; 50], 4, 0).is_ok());
+        assert!(Mixture::fit(&flat, &[0.0; 50], 4, 0).is_err());
+        assert!(Mixture::fit(&[], &[], 4, 0).is_err());
     }
 }

@@ -2,11 +2,10 @@
 //!
 //! This module contains the parameter spaces of scenarios, kernel density estimation, and Gaussian mixtures with their
 //! fit, which represent every density and proposal. It also contains the physically valid fraction of a density,
-//! exposure, representativeness, and the density file. It contains nothing about lanes. Scenarios come from
-//! mining or a scenario file; points become cases through [`crate::scenario::parameterization`].
+//! exposure, and the density file. It contains nothing about lanes. Scenarios come from mining or a scenario file; points
+//! become cases through [`crate::scenario::parameterization`].
 
 mod bandwidth;
-mod constrained;
 mod json_rows;
 mod kde;
 mod mixture;
@@ -16,24 +15,16 @@ mod model_file;
 pub(crate) mod moments;
 pub(crate) mod normal;
 mod parameters;
-mod representativeness;
 mod rosenblatt;
-mod transformed;
-mod transport;
 mod valid;
 
 pub use bandwidth::{Bandwidth, BandwidthRule, LeaveOneOut, SearchEnd};
-pub use constrained::ConstrainedKde;
 pub use kde::Kde;
 pub use mixture::Mixture;
-pub(crate) use mixture_fit::FitOptions as MixtureFitOptions;
 pub use model::{DensityModel, Exposure, FitOptions, Fitted, Provenance, Rate};
 pub use model_file::{MAX_FILE_BYTES, read_density, write_density};
 pub use moments::standard_deviation;
 pub use normal::Draws;
 pub use normal::{normal_cdf, normal_quantile};
 pub use parameters::{BoundedColumn, Invalid, ParameterSpace};
-pub use representativeness::{Representativeness, metric};
-pub use transformed::{DensityKind, Transformation, TransformedMixture};
-pub use transport::wasserstein;
 pub use valid::{Refused, ValidFraction};

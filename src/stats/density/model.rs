@@ -11,12 +11,9 @@ use statrs::distribution::{ContinuousCDF, Gamma};
 
 use super::bandwidth::BandwidthRule;
 use super::kde::Kde;
-use super::mixture::Mixture;
+use super::model_file::EarlierFigures;
 use super::parameters::ParameterSpace;
-use super::representativeness::Representativeness;
-use super::transformed::{DensityKind, TransformedMixture};
 use super::valid::{VALID_FRACTION_DRAWS, ValidFraction};
-use crate::random::Stream;
 use crate::scenario::parameterization::{Parameterization, ParameterizationOptions, Reduction, Sizes, SvdFit};
 use crate::scenario::{Category, Scenario};
 use crate::scenario::{DataProvenance, Driven};
@@ -49,16 +46,12 @@ pub struct FitOptions {
     pub parameterization: ParameterizationOptions,
     /// The observed headway is the last parameter.
     pub with_thw: bool,
-    /// Form of the density.
-    pub kind: DensityKind,
     /// Interval of the bandwidth.
     pub rule: BandwidthRule,
     /// Number of draws for P_valid.
     pub valid_draws: u64,
-    /// Seed of P_valid and of the splits.
+    /// Seed of P_valid.
     pub seed: u64,
-    /// Computes representativeness by split, fit and comparison; costs five more fits.
-    pub representativeness: bool,
 }
 
 impl Default for FitOptions {
@@ -66,11 +59,9 @@ impl Default for FitOptions {
         FitOptions {
             parameterization: ParameterizationOptions::of_densities(),
             with_thw: false,
-            kind: DensityKind::Kernel,
             rule: BandwidthRule::Reduction,
             valid_draws: VALID_FRACTION_DRAWS,
             seed: 157,
-            representativeness: true,
         }
     }
 }
@@ -80,33 +71,28 @@ impl Default for FitOptions {
 pub struct DensityModel {
     /// Parameters, valid region, point → case.
     pub space: ParameterSpace,
-    /// The recorded points, and the kernel density over them: f̂ before truncation to the valid region, unless there is a
-    /// mixture.
+    /// f̂ before truncation to the valid region: kernels around the recorded points.
     pub kde: Kde,
-    /// f̂ as a mixture of transformed parameters.
-    pub transformed: Option<TransformedMixture>,
     /// Fraction of f̂ inside the valid region.
     pub valid: ValidFraction,
     /// Mean sizes of the scenarios that it was fitted on, because sizes are not parameters.
     pub sizes: Sizes,
     /// Events per hour and kilometre, if time or distance is known.
     pub exposure: Option<Exposure>,
-    /// Representativeness for unseen scenarios, if requested and computable.
-    pub representativeness: Option<Representativeness>,
+    /// What the file of an earlier version holds beside.
+    pub(super) earlier: Option<EarlierFigures>,
     /// Where it comes from.
     pub provenance: Provenance,
     /// The scenarios in the order of the kernels; empty if the density does not contain them.
     pub scenarios: Vec<Scenario>,
 }
 
-/// A density, the scenarios that it excludes, and figures that could not be computed.
+/// A density, and the scenarios that it excludes.
 pub struct Fitted {
     /// The density.
     pub model: DensityModel,
     /// One error per kept scenario that is not a point of the space.
     pub left_out: Vec<Error>,
-    /// Why representativeness is missing although it was requested.
-    pub not_compared: Option<Error>,
 }
 
 impl DensityModel {
@@ -162,26 +148,11 @@ impl DensityModel {
         }
         let names: Vec<&str> = space.parameters().iter().map(|p| p.name.as_str()).collect();
         let kde = Kde::fit(points, &names, options.rule).map_err(|error| named(error, &name()))?;
-        let transformed =
-            TransformedMixture::fit(options.kind, kde.points(), space.parameters()).map_err(|e| named(e, &name()))?;
-        let draw = |stream: &Stream, index: u64| match &transformed {
-            Some(mixture) => mixture.draw(stream, index),
-            None => kde.draw(stream, index),
-        };
-        let valid =
-            ValidFraction::count(draw, &space, options.valid_draws, options.seed).map_err(|e| named(e, &name()))?;
+        let valid = ValidFraction::count(&kde, &space, options.valid_draws, options.seed);
+        let valid = valid.map_err(|error| named(error, &name()))?;
         let Some(sizes) = Sizes::mean(used.iter().copied()) else {
             return Err(Error::Internal(format!("{}: a density without scenarios", name())));
         };
-        let mut not_compared = None;
-        let mut representativeness = None;
-        if options.representativeness {
-            match Representativeness::estimate(&space, &used, (options.kind, options.rule), options.seed) {
-                Ok(found) => representativeness = Some(found),
-                Err(error @ Error::Input { .. }) => not_compared = Some(named(error, &name())),
-                Err(error) => return Err(error),
-            }
-        }
         let provenance = Provenance {
             program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
             data: facts.data.clone(),
@@ -193,49 +164,13 @@ impl DensityModel {
         };
         let exposure = facts.driven.map(|driven| Exposure::new(kept.len() as u64, driven));
         let scenarios = used.into_iter().cloned().collect();
-        let model =
-            DensityModel { space, kde, transformed, valid, sizes, exposure, representativeness, provenance, scenarios };
-        Ok(Fitted { model, left_out, not_compared })
+        let model = DensityModel { space, kde, valid, sizes, exposure, earlier: None, provenance, scenarios };
+        Ok(Fitted { model, left_out })
     }
 
     /// Kind of scenario.
     pub fn category(&self) -> Category {
         self.space.id().category
-    }
-
-    /// Form of the density.
-    pub fn kind(&self) -> DensityKind {
-        self.transformed.as_ref().map_or(DensityKind::Kernel, |of| of.kind)
-    }
-
-    /// f̂ as a mixture, not truncated; over [transformed parameters](DensityModel::latent) unless its kind is `kernel`.
-    /// Proposals are over the same ones.
-    ///
-    /// # Errors
-    /// None for a model that this type made or read.
-    pub fn mixture(&self) -> Result<Mixture> {
-        self.transformed.as_ref().map_or_else(|| self.kde.mixture(), |of| Ok(of.mixture.clone()))
-    }
-
-    /// Parameters in their units, of a point of the [mixture](DensityModel::mixture).
-    pub fn values(&self, latent: &[f64]) -> Vec<f64> {
-        self.transformed.as_ref().map_or_else(|| latent.to_vec(), |of| of.transformation.values(latent))
-    }
-
-    /// The point of the [mixture](DensityModel::mixture) of parameters in their units.
-    pub fn latent(&self, values: &[f64]) -> Vec<f64> {
-        self.transformed.as_ref().map_or_else(|| values.to_vec(), |of| of.transformation.inverse(values))
-    }
-
-    /// ln |dx/dz| at a point of the [mixture](DensityModel::mixture): the density of the parameters in their units is the
-    /// mixture's over this.
-    pub fn log_slope(&self, latent: &[f64]) -> f64 {
-        self.transformed.as_ref().map_or(0.0, |of| of.transformation.log_slope(latent))
-    }
-
-    /// Components of the mixture.
-    pub fn components(&self) -> usize {
-        self.transformed.as_ref().map_or(self.kde.points().len(), |of| of.mixture.weights().len())
     }
 }
 

@@ -15,8 +15,6 @@ use super::json_rows::to_readable_json;
 use super::kde::Kde;
 use super::model::{DensityModel, Exposure, Provenance};
 use super::parameters::ParameterSpace;
-use super::representativeness::Representativeness;
-use super::transformed::{TransformedMixture, TransformedRecord};
 use super::valid::ValidFraction;
 use crate::scenario::parameterization::{
     Parameter, Parameterization, ParameterizationOptions, Reduction, Sizes, SvdBasis,
@@ -56,7 +54,8 @@ struct File {
     bandwidth: Bandwidth,
     p_valid: ValidFraction,
     exposure: Option<Exposure>,
-    representativeness: Option<Representativeness>,
+    /// Null, but in files of earlier versions.
+    representativeness: Option<EarlierFigures>,
     /// Means over the scenarios, because sizes are not parameters.
     sizes: Sizes,
     options: ParameterizationOptions,
@@ -64,11 +63,29 @@ struct File {
     basis: Option<Basis>,
     /// One row per scenario, in the order of the parameters.
     kernels: Vec<Vec<f64>>,
-    /// f̂, if it is not over the kernels.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    mixture: Option<TransformedRecord>,
     /// One scenario per kernel, with its recorded series; or an empty list.
     scenarios: Vec<Scenario>,
+}
+
+/// How earlier versions compared drawn with unseen scenarios. Nothing uses it, but the file's checksum covers it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct EarlierFigures {
+    metric: f64,
+    metric_deviation: f64,
+    generated_test: f64,
+    generated_train: f64,
+    train_test: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    sinkhorn: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    log_likelihood: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    log_likelihood_deviation: Option<f64>,
+    repetitions: u64,
+    train: u64,
+    test: u64,
+    seed: u64,
 }
 
 /// The part of a decomposition that the coefficients need.
@@ -110,12 +127,11 @@ impl File {
             bandwidth: *model.kde.bandwidth(),
             p_valid: model.valid.clone(),
             exposure: model.exposure,
-            representativeness: model.representativeness,
+            representativeness: model.earlier,
             sizes: model.sizes,
             options: space.options().clone(),
             basis,
             kernels: model.kde.points().to_vec(),
-            mixture: model.transformed.as_ref().map(TransformedMixture::record),
             scenarios: model.scenarios.clone(),
         };
         file.content_sha256 = file.hash()?;
@@ -210,20 +226,13 @@ impl File {
         if self.category == Category::CutOut && self.sizes.lead.is_none() {
             return wrong("sizes", "a cut-out needs the size of the vehicle ahead (`lead`)".to_owned());
         }
-        let d = space.dimensions();
-        let transformed = self.mixture.map(|record| TransformedMixture::from_record(record, d)).transpose();
-        let transformed = transformed.map_err(|error| match inside(place, error) {
-            Error::Input { place, problem, help } => Error::input(place.column("mixture"), problem, help),
-            other => other,
-        })?;
         Ok(DensityModel {
             space,
             kde,
-            transformed,
             valid: share,
             sizes: self.sizes,
             exposure: self.exposure,
-            representativeness: self.representativeness,
+            earlier: self.representativeness,
             provenance: self.provenance,
             scenarios: self.scenarios,
         })
@@ -279,13 +288,23 @@ impl DensityModel {
     }
 }
 
-/// Checks the version first, so that a file of another version is not reported as broken.
+/// Checks version and kind first, so that another file than those of [`File`] is not reported as broken.
 fn check_version(text: &[u8], place: &Place) -> Result<()> {
     #[derive(Deserialize)]
     struct Version {
         lanesweep_density: Option<serde_json::Value>,
+        /// Densities of other kinds, which earlier versions fitted.
+        mixture: Option<Other>,
+    }
+    #[derive(Deserialize)]
+    struct Other {
+        kind: String,
     }
     let version: Version = serde_json::from_slice(text).map_err(|e| broken(place, &e))?;
+    if let Some(Other { kind }) = version.mixture {
+        let problem = format!("a density of kind `{kind}`, but this program reads kernel densities");
+        return Err(Error::input(place.clone().column("mixture"), problem, "fit again"));
+    }
     match version.lanesweep_density {
         Some(value) if value.as_u64() == Some(VERSION) => Ok(()),
         Some(value) => Err(Error::input(

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::kde::Kde;
 use super::normal::normal_quantile;
 use super::parameters::{Invalid, ParameterSpace};
 use crate::random::Stream;
@@ -49,21 +50,16 @@ pub struct ValidFraction {
 }
 
 impl ValidFraction {
-    /// Counts the valid ones among draws of indices. The count does not depend on the number of threads.
+    /// Counts the valid ones among draws of a density. The count does not depend on the number of threads.
     ///
     /// # Errors
     /// [`Error::Input`] if no draw is valid; [`Error::Usage`] for 0 draws.
-    pub fn count(
-        draw: impl Fn(&Stream, u64) -> Vec<f64> + Sync,
-        space: &ParameterSpace,
-        draws: u64,
-        seed: u64,
-    ) -> Result<ValidFraction> {
+    pub fn count(kde: &Kde, space: &ParameterSpace, draws: u64, seed: u64) -> Result<ValidFraction> {
         if draws == 0 {
             return Err(Error::usage(Place::item("draws"), "0 draws count nothing", "give at least 1, like 100000"));
         }
         let stream = Stream { seed, purpose: VALID_FRACTION_PURPOSE };
-        let broken = |index: u64| space.check_draw(&draw(&stream, index)).err();
+        let broken = |index: u64| space.check_draw(&kde.draw(&stream, index)).err();
         let count = |mut counts: BTreeMap<(String, String), u64>, (by, draws): ((String, String), u64)| {
             *counts.entry(by).or_default() += draws;
             counts

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::evaluated_points::Pool;
 use crate::Result;
-use crate::stats::density::{Mixture, MixtureFitOptions};
+use crate::stats::density::Mixture;
 
 /// A fit is widened: most of its weight in copies with this much more variance …
 const NARROW: (f64, f64) = (0.75, 1.2);
@@ -41,8 +41,7 @@ pub(super) fn fitted(pool: &Pool, points: &[usize], weights: &[f64], seed: u64) 
     }
     let kept: Vec<Vec<f64>> = order.iter().map(|at| pool.points[points[*at]].clone()).collect();
     let weights: Vec<f64> = order.iter().map(|at| weights[*at]).collect();
-    let options = MixtureFitOptions { components: COMPONENTS, seed, ..MixtureFitOptions::default() };
-    let fit = Mixture::fit(&kept, &weights, &options)?;
+    let fit = Mixture::fit(&kept, &weights, COMPONENTS, seed)?;
     Mixture::join(&[(NARROW.0, &fit.scaled(NARROW.1)?), (WIDE.0, &fit.scaled(WIDE.1)?)])
 }
 

@@ -13,6 +13,7 @@ use lanesweep::scenario::DataProvenance;
 use lanesweep::scenario::parameterization::ParameterizationOptions;
 use lanesweep::scenario::{Category, Scenario, read_scenarios};
 use lanesweep::stats::density::{DensityModel, Exposure, read_density};
+use lanesweep::stats::random::Stream;
 use lanesweep::support::plausibility::Implausible;
 use lanesweep::traffic::mining::{MiningOptions, mine, mine_folder};
 use lanesweep::traffic::trajectory::Inputs;
@@ -171,21 +172,17 @@ fn parameterization(bytes: &[u8], _: &Path, seeds: &Seeds, _: bool) -> Result<()
 }
 
 /// The plan of a few samples.
-pub fn small_plan(
-    density: &DensityModel,
-    proposal: &lanesweep::stats::density::Mixture,
-    profile: &Profile,
-) -> Result<LanePlan> {
+pub fn small_plan(density: &DensityModel, profile: &Profile) -> Result<LanePlan> {
     let options = SampleOptions {
         seed: 5,
         ..SampleOptions::new(Estimator::CRUDE, 20, SampleHeadways::Each(vec![Headway::ThwS(1.0)]))
     };
-    plan_samples(density, proposal, profile, &options)
+    plan_samples(density, profile, &options)
 }
 
 fn density(bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> {
     let density = read_density(&file(bytes, dir, "d.json"))?;
-    let plan = small_plan(&density, &density.mixture()?, &seeds.profile)?;
+    let plan = small_plan(&density, &seeds.profile)?;
     if heavy { run_some(&plan, 2) } else { Ok(()) }
 }
 
@@ -198,10 +195,11 @@ fn external(bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> 
     if heavy { run_some(&plan, 1) } else { Ok(()) }
 }
 
-fn proposal(bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> {
-    let density = density_of(seeds);
-    let plan = small_plan(density, &read_proposal(&file(bytes, dir, "g.json"), density)?, &seeds.profile)?;
-    if heavy { run_some(&plan, 2) } else { Ok(()) }
+fn proposal(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
+    let proposal = read_proposal(&file(bytes, dir, "g.json"), density_of(seeds))?;
+    let stream = Stream { seed: 5, purpose: 1 };
+    (0..20).for_each(|index| drop(proposal.draw(&stream, index, 0)));
+    Ok(())
 }
 
 /// The message of a density file whose content was changed says which checksum would fit.
@@ -223,7 +221,7 @@ fn part(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
     for tally in read.segments {
         tally.samples();
         tally.valid();
-        let plan = small_plan(density_of(seeds), &density_of(seeds).mixture()?, &seeds.profile)?;
+        let plan = small_plan(density_of(seeds), &seeds.profile)?;
         let joined = SampleTally::empty(&plan).merge(tally.clone())?;
         let back = tally.clone().merge(SampleTally::empty(&plan))?;
         joined.samples();

@@ -184,13 +184,13 @@ impl Seeds {
                 scenarios_sha256: String::new(),
                 driven: None,
             };
-            let options = FitOptions { representativeness: false, valid_draws: 200, ..FitOptions::default() };
+            let options = FitOptions { valid_draws: 200, ..FitOptions::default() };
             let id = Parameterization::find(category, key).unwrap();
             DensityModel::fit(id, &first_of(&mined, category, n), &facts, &options).unwrap().model
         };
         let density = fit(Category::CutIn, "2", 8);
         let others = [fit(Category::Lvd, "ii", 6), fit(Category::Lvd, "iii", 8), fit(Category::CutOut, "b", 10)];
-        let plan = small_plan(&density, &density.mixture().unwrap(), &profile).unwrap();
+        let plan = small_plan(&density, &profile).unwrap();
         let chunk = CpuBackend::<f64>::reference().prepare(&plan).unwrap().run(PART_UNITS, Wanted::Outcomes).unwrap();
         let tally = SampleTally::of_chunk(&plan, &chunk).unwrap();
         let journal = written(|path| {
@@ -249,7 +249,7 @@ impl Seeds {
             exid: exid(),
             track_tables: track_tables(),
             presets: presets(),
-            proposals: vec![proposal_text(&density, &density.mixture().unwrap()).unwrap().into_bytes()],
+            proposals: vec![proposal_text(&density, &density.kde.mixture().unwrap()).unwrap().into_bytes()],
             parts: vec![part],
             plans: vec![{
                 let outlined = outline_study(&few, &profile, &StudyOptions::default()).unwrap();
