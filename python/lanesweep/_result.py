@@ -68,7 +68,7 @@ class Result:
     text : str
         The result for people, as the command line prints it; `print` shows it.
     document : dict
-        The numbers as one document, as ``--format json`` prints it.
+        What ``--format json`` prints: the record of the run, or its numbers.
     messages : list of str
         Lines of the log: what was found, and what was left out.
     path, folder : Path or None
