@@ -54,9 +54,6 @@ impl MapReport {
                 share: failed as f64 / map.cell_count() as f64,
                 // Cells by outcome (no conflict, pass, fail, …), for the outcomes that tables and legends count.
                 outcomes: outcomes.collect::<BTreeMap<_, _>>(),
-                // Cells whose outcome a perturbation changes, if perturbed cases were swept.
-                #[serde(flatten)]
-                robustness: map.has_undecided().then(|| record! { undecided: counts[CellOutcome::Undecided as usize] }),
                 known_percent: mapped.known_percent[at],
             }
         });
@@ -80,12 +77,6 @@ impl MapReport {
             cases: grid.style(),
             native_gap: grid.has_native_gap(),
             cells: map.cell_count(),
-            verdicts: map.cell_count() * map.models.len(),
-            // Verdicts that a perturbation changes, if perturbed cases were swept.
-            undecided: map.has_undecided().then(|| {
-                let of = |model| map.outcomes(model, self.criterion)[CellOutcome::Undecided as usize];
-                (0..map.models.len()).map(of).sum::<u64>()
-            }),
             // Cut-outs: cells in which the vehicle that cuts out drives through the one ahead of it.
             drives_through: mapped.drives_through.iter().filter(|drives| **drives).count(),
             // Whether the grid was chosen to match a known fraction.

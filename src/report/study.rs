@@ -13,9 +13,7 @@ use crate::Result;
 use crate::engine::{ENGINE_VERSION, Headway, Partial, SweepSummary};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
-use crate::run::score::{
-    Best, CategoryScores, Misfit, ScoreCell, ScoreTable, f1, published_failures, published_lvd_f1,
-};
+use crate::run::score::{Best, CategoryScores, Misfit, ScoreTable, f1, published_failures, published_lvd_f1};
 use crate::run::study::{ReferenceComparison, Study, StudyEvaluation, StudyProvenance};
 use crate::scenario::Category;
 use crate::scenario::parameterization::Parameterization;
@@ -192,8 +190,6 @@ pub(super) struct CategoryRecord<'a> {
     pub capped_lanes: u64,
     /// Cells of the score table whose F1 is 0/0.
     pub undefined_f1: u64,
-    /// Intervals of F1 over scenarios: cells, those with an interval, its median and largest width.
-    f1_intervals: Value,
     /// Cumulative explained variance of the decomposition's first coefficients, if there is one.
     svd_explained: &'a [f64],
     /// Number of folds, with cross-validation.
@@ -253,7 +249,7 @@ impl StudyReport<'_> {
         let blocks = plan.blocks.iter().zip(&self.study.facts().categories);
         let records = blocks.map(|(block, of)| {
             let scored = self.evaluation.scores.categories.iter().find(|c| c.category == block.category);
-            let cells = || scored.iter().flat_map(|c| &c.cells).filter(|c| c.variant > 0);
+            let cells = scored.iter().flat_map(|c| &c.cells).filter(|c| c.variant > 0);
             CategoryRecord {
                 category: block.category,
                 found: of.found,
@@ -261,22 +257,13 @@ impl StudyReport<'_> {
                 variants: &block.variants,
                 lanes: plan.lanes_per_unit(block) * block.units.len(),
                 capped_lanes: scored.map_or(0, |c| c.capped.iter().sum()),
-                undefined_f1: cells().filter(|c| f1(&c.counts).is_none()).count() as u64,
-                f1_intervals: f1_widths(cells()),
+                undefined_f1: cells.filter(|c| f1(&c.counts).is_none()).count() as u64,
                 svd_explained: &of.svd_explained,
                 folds: of.folds.iter().map(|(_, fold)| fold + 1).max(),
             }
         });
         records.collect()
     }
-}
-
-fn f1_widths<'c>(cells: impl Iterator<Item = &'c ScoreCell> + Clone) -> Value {
-    let widths = cells.clone().filter_map(|cell| cell.f1_interval.map(|interval| interval.high - interval.low));
-    let mut widths: Vec<f64> = widths.collect();
-    widths.sort_by(f64::total_cmp);
-    let (median, widest) = (widths.get(widths.len() / 2), widths.last());
-    serde_json::json!({"cells": cells.count(), "known": widths.len(), "median_width": median, "widest": widest})
 }
 
 /// A best parameterization; undefined numbers are null.
