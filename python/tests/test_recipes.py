@@ -250,6 +250,13 @@ def test_the_worst_lanes_have_the_fastest_contacts(sampled: pl.DataFrame) -> Non
     assert recipes.worst(sampled, 1, criterion="ttc")["min_ttc_s"].max() == 0.0
 
 
+def test_failing_lanes_have_the_worst_contacts_of_all_rows(density: Path, sampled: pl.DataFrame, tmp_path: Path) -> None:
+    failures = tmp_path / "failures.parquet"
+    lanesweep.sample(density, samples=2000, models=["CCHDM", "FSM"], thw=[0.6, 1.2], failures=failures)
+    found = recipes.worst(failures, 5).select("model", "sample", "headway")
+    assert found.rows() == recipes.worst(sampled, 5).select("model", "sample", "headway").rows()
+
+
 def test_momentum_divides_the_closing_speed_and_curves_have_the_numbers_of_their_sources() -> None:
     rows = {"contact_type": [2, 1, 2, 0], "impact_closing_speed_mps": [10.0, 10.0, -1.0, None]}
     equal, truck = recipes.delta_v(rows), recipes.delta_v(rows, other_kg=16_000)
