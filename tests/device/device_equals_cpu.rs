@@ -160,7 +160,7 @@ fn one_unit_in_the_last_place_of_a_constant_is_found() {
         ("driver_ttc * closes", "bitcast<f32>(bitcast<u32>(driver_ttc) + 1u) * closes"),
         ("v_ego * driver_tau", "v_ego * bitcast<f32>(bitcast<u32>(driver_tau) + 1u)"),
         ("v_ego * driver_response_time", "v_ego * bitcast<f32>(bitcast<u32>(driver_response_time) + 1u)"),
-        ("return criteria_ttc_threshold", "return bitcast<f32>(bitcast<u32>(criteria_ttc_threshold) + 1u)"),
+        ("limit = criteria_ttc_threshold", "limit = bitcast<f32>(bitcast<u32>(criteria_ttc_threshold) + 1u)"),
         ("closing * btn_ramp_delay", "closing * bitcast<f32>(bitcast<u32>(btn_ramp_delay) + 1u)"),
     ];
     for (from, to) in plants {
