@@ -102,7 +102,7 @@ const DRIVER_CRUDE: u64 = 1 << 15;
 /// Maximum number of draws of importance sampling after a search, if none is given.
 const MAX_DRAWS: u64 = 10_000_000;
 
-/// Maximum number of samples of a run that can be split and resumed; the same as for `compare`.
+/// Maximum number of samples of a run that can be split and resumed.
 const MAX_SPLIT: u64 = (1 << 48) - 1;
 
 /// The error for a flag that only crude Monte Carlo has.
@@ -121,15 +121,11 @@ impl Sample {
         if let Some((flag, _)) = belongs_to_crude.iter().find(|(_, given)| *given && !is_crude) {
             return Err(only_crude(flag));
         }
-        let check_range = |flag: &str, value: u64, min: u64, max: u64| {
-            if (min..=max).contains(&value) {
-                return Ok(());
-            }
-            let help = format!("give at least {min} and at most {max}");
-            Err(Error::usage(Place::item(flag), format!("{value} is out of range"), help))
-        };
         if settings.estimator == EstimatorKind::Is {
-            check_range("--samples", settings.samples.unwrap_or(DEFAULT_SAMPLES), 1, MAX_SPLIT)?;
+            if let Some(samples) = settings.samples.filter(|samples| *samples > MAX_SPLIT) {
+                let help = format!("give at least 1 and at most {MAX_SPLIT}");
+                return Err(Error::usage(Place::item("--samples"), format!("{samples} is out of range"), help));
+            }
             if settings.time_limit_s.is_some() {
                 return Err(only_crude("--time-limit"));
             }

@@ -21,7 +21,7 @@ use crate::support::table::{Column, Digits, NumberText, Table, TableOf};
 
 /// The density of a run.
 #[derive(Debug, Clone, Serialize)]
-pub struct DensityRecord {
+pub(super) struct DensityRecord {
     /// SHA-256 of its content.
     pub sha256: String,
     /// Category.
@@ -41,7 +41,7 @@ impl DensityRecord {
     ///
     /// # Errors
     /// As [`DensityModel::content_sha256`].
-    pub(crate) fn of(density: &DensityModel) -> Result<DensityRecord> {
+    pub(super) fn of(density: &DensityModel) -> Result<DensityRecord> {
         Ok(DensityRecord {
             sha256: density.content_sha256()?,
             category: density.category(),
@@ -55,7 +55,7 @@ impl DensityRecord {
 
 /// Draws of crude Monte Carlo.
 #[derive(Debug, Clone, Serialize)]
-pub struct DrawRecord {
+pub(super) struct DrawRecord {
     /// Ranges of drawn sample indices: [first, one past the last].
     pub ranges: Vec<[u64; 2]>,
     /// Samples, void ones included.
@@ -91,25 +91,25 @@ impl DrawRecord {
 /// A sampling run with the facts that its files state.
 pub struct SampleReport {
     /// The density sampled.
-    pub density: DensityRecord,
+    pub(super) density: DensityRecord,
     /// Profile, with its time step.
-    pub profile: Profile,
+    pub(super) profile: Profile,
     /// Options, as in the plan.
-    pub options: SampleOptions,
+    pub(super) options: SampleOptions,
     /// Headways, by name.
-    pub headways: Vec<String>,
+    pub(super) headways: Vec<String>,
     /// Headways, as in the plan.
-    pub plan_headways: Vec<Headway>,
+    pub(super) plan_headways: Vec<Headway>,
     /// Hash of the plan; only for crude Monte Carlo.
-    pub plan_sha256: Option<String>,
+    pub(super) plan_sha256: Option<String>,
     /// Draws; only for crude Monte Carlo.
-    pub draws: Option<DrawRecord>,
+    pub(super) draws: Option<DrawRecord>,
     /// Estimates.
-    pub estimates: Vec<EstimateRow>,
+    pub(super) estimates: Vec<EstimateRow>,
     /// Rounds of the search of importance sampling.
-    pub search: Vec<SearchRound>,
+    pub(super) search: Vec<SearchRound>,
     /// The machine.
-    pub host: Host,
+    pub(super) host: Host,
 }
 
 impl SampleReport {
@@ -171,15 +171,6 @@ impl SampleReport {
             count_of(density.kernels),
             density.provenance.data
         );
-        if let Some(draws) = self
-            .draws
-            .as_ref()
-            .filter(|d| d.samples < self.options.stop.samples && self.stopped() == StopReason::Samples)
-        {
-            let ranges: Vec<String> =
-                draws.ranges.iter().map(|[a, b]| format!("{}..{}", count(*a), count(*b))).collect();
-            let _ = writeln!(text, "A PART: samples {} of {}", ranges.join(", "), count(self.options.stop.samples));
-        }
         if let Some(draws) = &self.draws {
             let _ = writeln!(
                 text,

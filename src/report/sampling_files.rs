@@ -41,8 +41,8 @@ impl SampleReport {
     /// # Errors
     /// [`Error::Io`].
     pub fn write(&self, mut results: Results, sample: &Sample, result: &SampleResult) -> Result<ResultFiles> {
-        let (density, mut figures) = (sample.density(), Vec::new());
-        if let Some(run) = result.crude.as_ref().filter(|run| !run.convergence.is_empty()) {
+        let (density, mut figures) = (&sample.density, Vec::new());
+        if let Some(run) = &result.crude {
             results.add("convergence.csv", convergence_csv(&run.convergence).as_bytes())?;
             let svg = convergence(density, &run.convergence, self.level()).svg();
             figures.push(PageFigure::add_svg(&mut results, "convergence", &svg, "convergence.csv")?);
@@ -55,14 +55,6 @@ impl SampleReport {
             results.add("proposal.json", proposal_text(density, proposal)?.as_bytes())?;
         }
         results.add("density.json", &density.to_json()?)?;
-        self.publish(results, figures)
-    }
-
-    /// Adds table and page of the estimates, then publishes all files with the record; returns their names.
-    ///
-    /// # Errors
-    /// [`Error::Io`].
-    fn publish(&self, mut results: Results, mut figures: Vec<PageFigure>) -> Result<ResultFiles> {
         if let Some(figure) = self.headways_figure() {
             figures.insert(0, PageFigure::add(&mut results, "headways", &figure)?);
         }

@@ -84,7 +84,7 @@ impl SampleReport {
 }
 
 /// `convergence.csv`.
-pub fn convergence_csv(checkpoints: &[Checkpoint]) -> String {
+pub(super) fn convergence_csv(checkpoints: &[Checkpoint]) -> String {
     let rows = checkpoints.iter().flat_map(|of| of.rows.iter().map(move |row| (of.samples, row)));
     Table::of(rows)
         .column("samples", |(samples, _)| samples)
@@ -224,9 +224,7 @@ impl SampleReport {
 
     /// What the intervals cover in addition to the draws.
     pub(super) fn interval_rule(&self) -> &'static str {
-        if self.density.kernels == 0 {
-            ""
-        } else if self.estimates.iter().all(|row| row.failing_scenarios.is_some()) {
+        if self.estimates.iter().all(|row| row.failing_scenarios.is_some()) {
             " cover the draws and what other scenarios would change, at fixed bandwidth and scale"
         } else {
             " cover the draws alone, not what other scenarios would change"

@@ -45,12 +45,8 @@ pub struct CheckpointRow {
 pub struct CrudeRun {
     /// The counts.
     pub tally: SampleTally,
-    /// The estimates.
-    pub rows: Vec<EstimateRow>,
-    /// Estimates at the checkpoints; empty for a range that does not begin at 0.
+    /// Estimates at the checkpoints.
     pub convergence: Vec<Checkpoint>,
-    /// How the sweep went.
-    pub summary: SweepSummary,
 }
 
 /// The sample sizes at which a run of `samples` samples is evaluated, and at which its counts are cut.
@@ -75,13 +71,8 @@ pub(super) fn sample_into(
 ) -> Result<Computed> {
     let started = Instant::now();
     let range = ledger.units();
-    if range.start >= range.end || range.end > plan.unit_count() {
-        let problem = format!("samples {}..{} are not among the run's {}", range.start, range.end, plan.unit_count());
-        return Err(Error::usage(
-            Place::option("shard"),
-            problem,
-            "give an interval that is not empty, counted from 0",
-        ));
+    if range.is_empty() {
+        return Ok(Computed::whole(SweepSummary::default()));
     }
     let is_whole = range == (0..plan.unit_count());
     if !is_whole && !options.stop.is_fixed() {
@@ -135,7 +126,6 @@ pub(super) fn crude_of_segments(
     mut segments: Vec<SampleTally>,
     options: &SampleOptions,
     exposure: Option<&Exposure>,
-    computed: &Computed,
 ) -> Result<CrudeRun> {
     segments.sort_by_key(|segment| segment.covered().first().map_or(0, |range| range.start));
     let looks = checkpoints(plan.unit_count());
@@ -152,8 +142,7 @@ pub(super) fn crude_of_segments(
             convergence.push(Checkpoint { samples: covered.end, rows });
         }
     }
-    let rows = crude_rows(plan, &tally, options, exposure, computed.stopped);
-    Ok(CrudeRun { tally, rows, convergence, summary: computed.summary })
+    Ok(CrudeRun { tally, convergence })
 }
 
 /// The rows over all headways.

@@ -155,11 +155,6 @@ impl Sample {
         kind == KIND
     }
 
-    /// The density.
-    pub fn density(&self) -> &DensityModel {
-        &self.density
-    }
-
     /// The plan of crude Monte Carlo; its lanes have indices.
     pub fn lane_plan(&self) -> Option<&LanePlan> {
         match &self.kind {

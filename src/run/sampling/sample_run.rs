@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::crude::{checkpoints, crude_of_segments, sample_into};
+use super::estimate_rows::crude_rows;
 use super::plan_file::SEARCH_FILE;
 use super::result::SampleResult;
 use super::weighted::WeightedTally;
@@ -129,26 +130,21 @@ impl Job for CrudeJob<'_> {
         executor: &Executor,
         each: Option<&mut EachChunk>,
     ) -> Result<Computed> {
-        if ledger.units().is_empty() {
-            return Ok(Computed::whole(SweepSummary::default()));
-        }
         let (options, exposure) = (&self.sample.options, self.sample.density.exposure.as_ref());
         sample_into(self.plan, ledger, executor, options, exposure, each)
     }
 
     fn result(&self, counts: Vec<SampleTally>, computed: Computed, place: Place) -> Result<SampleResult> {
         let (options, exposure) = (&self.sample.options, self.sample.density.exposure.as_ref());
-        let mut run = crude_of_segments(self.plan, counts, options, exposure, &computed)?;
+        let run = crude_of_segments(self.plan, counts, options, exposure)?;
         if options.stop.is_fixed() && run.tally.samples() != self.unit_count() {
             let problem = "the parts do not hold every sample that their names stand for";
             return Err(Error::input(place, problem, "make them again"));
         }
-        let (rows, rechecked_lanes) = (std::mem::take(&mut run.rows), run.summary.rechecked_lanes);
-        let parts = computed.parts;
         self.sample.against_recorded(SampleResult {
-            rows,
-            rechecked_lanes,
-            parts,
+            rows: crude_rows(self.plan, &run.tally, options, exposure, computed.stopped),
+            rechecked_lanes: computed.summary.rechecked_lanes,
+            parts: computed.parts,
             crude: Some(run),
             ..SampleResult::default()
         })

@@ -35,7 +35,7 @@ pub(super) fn integer(field: &[u8]) -> Option<i64> {
 
 /// Clinger's exact case: a mantissa and a power of ten that `f64` both holds exactly give, by one
 /// division, the correctly rounded value.
-fn short_decimal(field: &[u8]) -> Option<f64> {
+pub(super) fn short_decimal(field: &[u8]) -> Option<f64> {
     let (negative, digits) = match field {
         [b'-', rest @ ..] => (true, rest),
         _ => (false, field),

@@ -58,8 +58,9 @@ fn periods(mut recording: RawRecording, rate_hz: f64) -> Vec<RawRecording> {
     let ratio = median(&mut forward.map(|step| by(step, OTHER_CLOCK) * rate_hz / by(step, AT)).collect::<Vec<_>>());
     if ratio.is_nan() || (ratio - 1.0).abs() > MAX_RATE_DIFFERENCE {
         let told = significant(rate_hz / ratio, 3);
-        let note = format!("frames are used, of which {rate_hz} are a second; times tell {told}");
-        recording.notes.push(note);
+        recording.notes.push(format!(
+            "frames and times contradict one another: {rate_hz} frames per second, {told} by the times; frames are used"
+        ));
         return vec![recording];
     }
     let same = zeros.chunk_by(|a, b| b - a <= SAME_TIME_S).filter(|group| group.len() >= MIN_ROWS);

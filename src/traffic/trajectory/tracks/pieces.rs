@@ -58,7 +58,8 @@ pub(super) fn pieces(
     let mut first_jump = None;
     for (vehicle, of) in raw.vehicles.iter_mut().enumerate() {
         // From here on, pieces hold them.
-        let samples = std::mem::take(&mut of.samples).to_vec();
+        let mut stored = std::mem::take(&mut of.samples);
+        let samples = stored.to_vec();
         let differences_m = step_differences_m(&samples, time_s);
         let frames: Vec<f64> = samples.iter().map(|sample| frame(sample[AT])).collect();
         let mut from = 0;
@@ -79,12 +80,14 @@ pub(super) fn pieces(
                 return Err(bad(problem, "check the unit of `time`, the frame rates and `max_gap_s`"));
             }
             let (at_frames, first_frame) = at_frames(piece, frames);
+            let is_whole = matches!(at_frames, Cow::Borrowed(all) if all.len() == samples.len());
             interpolated += if let Cow::Owned(samples) = &at_frames { samples.len() as u64 } else { 0 };
             if at_frames.len() < MIN_PIECE {
                 short += 1;
                 continue;
             }
-            pieces.push(Piece { vehicle, first_frame, samples: at_frames.iter().collect() });
+            let samples = if is_whole { std::mem::take(&mut stored) } else { at_frames.iter().collect() };
+            pieces.push(Piece { vehicle, first_frame, samples });
         }
     }
     let gaps = pieces.len().saturating_sub(vehicles + jumps);

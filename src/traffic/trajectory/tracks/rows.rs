@@ -228,6 +228,13 @@ impl SampleRow<'_> {
     /// The number of a column in SI units; `None` if the column or the value is absent.
     pub(super) fn number(&self, role: Role) -> Result<Option<f64>> {
         let si = |value: f64, text: &dyn Fn() -> String| self.columns.si(value, role, text, || self.place(role));
+        // Most values, without a text.
+        if let (Line::Text(table), Some((at, _))) = (&self.source, self.columns.at[role as usize])
+            && !table.has_decimal_commas()
+            && let Some(value) = number::short_decimal(table.bytes(CsvColumn(at)))
+        {
+            return si(value, &|| String::from_utf8_lossy(table.bytes(CsvColumn(at))).into_owned());
+        }
         match self.cell(role) {
             TableCell::Text(text) => self.number_of(&text, role),
             TableCell::Whole(value) => si(value as f64, &|| value.to_string()),
