@@ -11,7 +11,6 @@ use statrs::distribution::{ContinuousCDF, Gamma};
 
 use super::bandwidth::BandwidthRule;
 use super::kde::Kde;
-use super::model_file::EarlierFigures;
 use super::parameters::ParameterSpace;
 use super::valid::{VALID_FRACTION_DRAWS, ValidFraction};
 use crate::scenario::parameterization::{Parameterization, ParameterizationOptions, Reduction, Sizes, SvdFit};
@@ -85,6 +84,27 @@ pub struct DensityModel {
     pub provenance: Provenance,
     /// The scenarios in the order of the kernels; empty if the density does not contain them.
     pub scenarios: Vec<Scenario>,
+}
+
+/// How earlier versions compared drawn with unseen scenarios. Nothing uses it, but the file's checksum covers it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct EarlierFigures {
+    metric: f64,
+    metric_deviation: f64,
+    generated_test: f64,
+    generated_train: f64,
+    train_test: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    sinkhorn: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    log_likelihood: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    log_likelihood_deviation: Option<f64>,
+    repetitions: u64,
+    train: u64,
+    test: u64,
+    seed: u64,
 }
 
 /// A density, and the scenarios that it excludes.

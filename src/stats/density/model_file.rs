@@ -13,7 +13,7 @@ use sha2::{Digest, Sha256};
 use super::bandwidth::Bandwidth;
 use super::json_rows::to_readable_json;
 use super::kde::Kde;
-use super::model::{DensityModel, Exposure, Provenance};
+use super::model::{DensityModel, EarlierFigures, Exposure, Provenance};
 use super::parameters::ParameterSpace;
 use super::valid::ValidFraction;
 use crate::scenario::parameterization::{
@@ -65,27 +65,6 @@ struct File {
     kernels: Vec<Vec<f64>>,
     /// One scenario per kernel, with its recorded series; or an empty list.
     scenarios: Vec<Scenario>,
-}
-
-/// How earlier versions compared drawn with unseen scenarios. Nothing uses it, but the file's checksum covers it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct EarlierFigures {
-    metric: f64,
-    metric_deviation: f64,
-    generated_test: f64,
-    generated_train: f64,
-    train_test: f64,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    sinkhorn: Option<f64>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    log_likelihood: Option<f64>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    log_likelihood_deviation: Option<f64>,
-    repetitions: u64,
-    train: u64,
-    test: u64,
-    seed: u64,
 }
 
 /// The part of a decomposition that the coefficients need.
