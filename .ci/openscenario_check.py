@@ -131,13 +131,13 @@ def main():
         found = ElementTree.parse(path).iter("Property")
         key = {entry.get("name"): entry.get("value") for entry in found}["lanesweep.lane"]
         folder = path.parent.name
-        if folder.startswith(("worst", "two")):
+        if folder.startswith(("any", "two")):
             run = [*program, "simulate", "--from", str(work / "run"), "--lane", key]
             text = subprocess.run(run, check=True, capture_output=True, text=True).stdout
         else:
             text = (path.parent / f"{key.rsplit('/', 1)[1]}.csv").read_text()
         rows = list(csv.DictReader(io.StringIO(text)))
-        side = 1.0 if folder.startswith("worst") else -1.0
+        side = 1.0 if folder.startswith("any") else -1.0
         count, off = compare(scenario, rows, side)
         vertices, largest = vertices + count, max(largest, off)
     print(f"{len(scenarios)} scenarios and roads: no issue of the ASAM quality checker; {vertices} vertices read by")
