@@ -156,11 +156,11 @@ fn a_signal_ends_a_run_within_five_seconds_also_in_its_first_chunk() {
 fn a_run_without_a_journal_that_is_interrupted_leaves_nothing() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("out");
-    let compare = "-q --threads 1 compare --backend cpu --synth-recordings 2 --samples 1e8 --out out";
-    let mut compare = start(dir.path(), &compare.split(' ').collect::<Vec<_>>());
-    wait_for_run(&mut compare, "the folder is locked", || out.join("run.lock").exists());
-    send("INT", compare.id());
-    assert_eq!((ended(compare).0, out.exists()), (128 + 2, false));
+    let map = "-q --threads 1 map cut-in --backend cpu --preset jrc --dt 0.001 --out out";
+    let mut map = start(dir.path(), &map.split(' ').collect::<Vec<_>>());
+    wait_for_run(&mut map, "the folder is locked", || out.join("run.lock").exists());
+    send("INT", map.id());
+    assert_eq!((ended(map).0, out.exists()), (128 + 2, false));
 }
 
 #[test]

@@ -170,11 +170,11 @@ fn files_of_another_engine_or_an_earlier_version_are_neither_merged_nor_continue
             // As versions before engines wrote it, all in one line.
             let earlier = r#""version":1,"sha256":"00","content":"#;
             std::fs::write(&path, &whole).unwrap();
-            edit(&path, &format!("\"version\":2,{engine}"), earlier);
-            refused(dir, &["merge", name], "its version is 1, this program reads 2");
+            edit(&path, &format!("\"version\":3,{engine}"), earlier);
+            refused(dir, &["merge", name], "its version is 1, this program reads 3");
             if file == "plan.json" {
                 let plan = format!("{name}/plan.json");
-                let said = format!("{plan}: its version is 1, this program reads 2");
+                let said = format!("{plan}: its version is 1, this program reads 3");
                 refused(dir, &[run[1], "--plan", &plan, "--out", "x"], &said);
             }
             std::fs::write(&path, &whole).unwrap();

@@ -6,6 +6,7 @@ mod layout;
 mod sample_tally;
 
 pub use kernel_counts::{KernelCounts, cell_of};
+#[cfg(feature = "gpu")]
 pub(super) use layout::PackedLanes;
 pub use layout::{CountLayout, Counted};
 pub use sample_tally::SampleTally;

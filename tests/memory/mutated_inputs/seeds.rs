@@ -115,7 +115,6 @@ fn presets() -> Vec<Vec<u8>> {
 title = "own tracks"
 format = "csv"
 files = "*.csv"
-delimiter = ","
 none = ["-1", "NA"]
 resample_hz = 20.0
 reference = "front"
@@ -123,7 +122,6 @@ road = "x"
 traffic = "right"
 max_gap_s = 0.5
 smoothing_s = 0.7
-exclude_doubtful = true
 [axes]
 y = "left"
 heading = "from-x"
