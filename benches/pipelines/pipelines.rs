@@ -8,7 +8,7 @@
 //! lanes of a study and of densities and their warps make instead, and how many if quiescent ones were skipped.
 
 // Vulkan's functions are unsafe: every handle comes from this file and outlives its use.
-#![allow(unsafe_code)]
+#![allow(clippy::undocumented_unsafe_blocks, unsafe_code)]
 
 #[path = "../common/mod.rs"]
 mod common;

@@ -260,8 +260,8 @@ pub fn stream_of(table: &Bound<'_, PyAny>) -> PyResult<RecordBatchStreamReader> 
     })?;
     let capsule = method.call0()?.cast_into::<PyCapsule>()?;
     let pointer = capsule.pointer_checked(Some(STREAM))?.cast::<FFI_ArrowArrayStream>();
-    // SAFETY: a capsule of this name holds a valid stream, and the reader moves it out.
     #[allow(unsafe_code)] // the C interface has no safe form
+    // SAFETY: a capsule of this name holds a valid stream, and the reader moves it out.
     let reader = unsafe { RecordBatchStreamReader::from_raw(pointer.as_ptr()) };
     reader.map_err(|error| input_error(format!("the table cannot be read: {error}")))
 }

@@ -46,7 +46,7 @@ const SIMULATING: &[&str] = &["study", "sample", "map", "verify", "show", "simul
 const GENERATING: &[&str] = &["study", "fit", "verify", "show"];
 
 #[rustfmt::skip] // a table: one line per flag
-pub(super) const FLAGS: [KeyFlag; 19] = [
+pub(super) const FLAGS: [KeyFlag; 18] = [
     ("run.threads", "threads", "", RUN, true, &["lanesweep"]),
     ("run.backend", "backend", "", RUN, false, SWEEPING),
     ("run.device", "device", "NAME|pci:BUS|INDEX", RUN, false, SWEEPING),
@@ -57,7 +57,6 @@ pub(super) const FLAGS: [KeyFlag; 19] = [
     ("generator.recordings", "synth_recordings", "", DATA, true, GENERATING),
     ("generator.recordings", "synth_recordings", "", DATA, false, &["synth"]),
     ("score.seed", "seed", "", RUN, false, &["study"]),
-    ("fit.density", "density", "", MODELS, false, &["fit"]),
     ("fit.seed", "seed", "", RUN, false, &["fit"]),
     ("sample.estimator", "estimator", "", MODELS, false, &["sample"]),
     ("sample.samples", "samples", "", MODELS, false, &["sample"]),

@@ -61,7 +61,6 @@ impl MapSheet<'_> {
             }
             .to_owned(),
             notes: ("Notes:", self.notes.clone()),
-            ..Figure::default()
         }
     }
 

@@ -13,7 +13,7 @@
 //! 2.5. Units below 1 are 2⁻²⁴ and above 2⁻²³; a guess is moved by the unit of the true quotient, also across 1.
 
 // SPIR-V is handed to the driver unseen, as src/engine/gpu/device.rs does with the shaders of this crate.
-#![allow(unsafe_code)]
+#![allow(unsafe_code, clippy::undocumented_unsafe_blocks)]
 
 use crate::common::device::software_device;
 use bytemuck::{Pod, Zeroable};

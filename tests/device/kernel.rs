@@ -1,7 +1,7 @@
 //! A WGSL kernel of a test on the software Vulkan: buffers of words in, one buffer of words out.
 
 // SPIR-V is handed to the driver unseen, as src/engine/gpu/device.rs does with the shaders of this crate.
-#![allow(unsafe_code)]
+#![allow(unsafe_code, clippy::undocumented_unsafe_blocks)]
 
 use lanesweep::engine::gpu::{exact_spirv, shader::ENTRY};
 

@@ -3,7 +3,7 @@
 //! deviates goes from one cubic to the next.
 
 // SPIR-V is handed to the driver unseen, as src/engine/gpu/device.rs does with the shaders of this crate.
-#![allow(unsafe_code)]
+#![allow(unsafe_code, clippy::undocumented_unsafe_blocks)]
 
 use crate::kernel::{Kernel, Path, WORKGROUP};
 use lanesweep::engine::gpu::shader::RANDOM;

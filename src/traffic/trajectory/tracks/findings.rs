@@ -110,7 +110,8 @@ impl Understanding {
         let mean = |track: &Track| track.v_s_mps.iter().map(|v| v.max(0.0)).sum::<f64>() / track.len() as f64;
         let length_m = |track: &Track| track.length_m;
         let width_m = |track: &Track| track.width_m;
-        let of_vehicles: [(Quantity, &dyn Fn(&Track) -> f64); 3] =
+        type Value<'a> = &'a dyn Fn(&Track) -> f64;
+        let of_vehicles: [(Quantity, Value); 3] =
             [(Quantity::Speed, &mean), (Quantity::Length, &length_m), (Quantity::Width, &width_m)];
         for (quantity, of) in of_vehicles {
             recording.tracks.iter().for_each(|track| check(quantity, of(track), format!("vehicle {}", track.id)));
