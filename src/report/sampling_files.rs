@@ -15,7 +15,7 @@ impl SampleReport {
     /// From a run and its result.
     ///
     /// # Errors
-    /// As [`DensityModel::content_sha256`].
+    /// As `DensityModel::content_sha256`.
     pub fn of_sample(sample: &Sample, result: &SampleResult, host: Host) -> Result<SampleReport> {
         let plan_headways = sample.options.headways().to_vec();
         let drawn = result.crude.as_ref().zip(sample.lane_plan());
@@ -39,7 +39,7 @@ impl SampleReport {
     /// Writes every file of the run to its folder, the record last; returns the names of the others.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`crate::Error::Io`].
     pub fn write(&self, mut results: Results, sample: &Sample, result: &SampleResult) -> Result<ResultFiles> {
         let (density, mut figures) = (&sample.density, Vec::new());
         if let Some(run) = &result.crude {

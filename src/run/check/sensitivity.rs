@@ -13,7 +13,7 @@ use crate::model::profile::Profile;
 pub struct RuleVerdicts {
     /// The changed key of the profile with its value; `None`: the profile as it is.
     pub reading: Option<&'static str>,
-    /// In the order of [`DriverRule::of`].
+    /// In the order of `DriverRule::of`.
     pub verdicts: Vec<(DriverRule, Verdict)>,
 }
 
