@@ -131,9 +131,6 @@ width_m = 3.5
 truck = ["truck"]
 ignored = ["bicycle"]
 truck_from_m = 7.0
-[sizes]
-default = [4.6, 1.9]
-truck = [12.0, 2.5]
 [columns]
 vehicle = "track_id"
 time = { name = "t", unit = "s", factor = 1.0 }
@@ -142,6 +139,7 @@ y = "y"
 heading = { name = "heading", unit = "deg" }
 speed = { name = "speed", unit = "m/s" }
 class = "class"
+width = "width"
 [vehicles]
 file = "*_meta.csv"
 columns = { vehicle = "id", length = "l" }
