@@ -3,7 +3,8 @@
 //!
 //! The stages: rows of a file (`rows`, `times`), vehicles in SI units (`raw`, `samples`, `apart`), gapless pieces (`pieces`,
 //! `boxes`), the lines of the road (`road`, `directions`), lanes (`lanes`), the recording (`assemble`), and what contradicts
-//! itself (`understanding`, `findings`). highD files have their own reader; what is no flat table becomes one in Python.
+//! itself (`understanding`, `findings`). highD files have their own reader. `lanesweep.tracks` in Python turns
+//! other formats into a flat table.
 
 mod apart;
 mod assemble;
