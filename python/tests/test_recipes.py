@@ -88,12 +88,16 @@ def test_infinite_is_a_value_and_empty_is_unknown(cases: pl.DataFrame, theirs: p
 
 
 def test_braking_is_compared_too_and_a_foreign_id_is_refused(cases: pl.DataFrame, tmp_path: Path) -> None:
-    few = cases.head(3)
-    few.write_csv(tmp_path / "few.csv")
+    few = cases.head(3).with_columns(answer=pl.lit("preventable"))
+    few.drop("answer").write_csv(tmp_path / "few.csv")
     sheet = lanesweep.check(tmp_path / "few.csv", row=1, profiles="un-r157").document
     (driver,) = [of for of in sheet["profiles"][0]["models"] if of["model"] == "CCHDM"]
     results = {"id": ["case-0"], "collision": [driver["collision"]], "braking_s": [driver["braking_s"] + 0.1]}
-    assert recipes.compare_results(few, results).cases["braking_s"][0] == pytest.approx(0.1)
+    compared = recipes.compare_results(few, {**results, "impact_speed_kmh": [3.0]})
+    assert compared.cases["braking_s"][0] == pytest.approx(0.1)
+    assert (compared.missing, compared.ignored) == (2, ["impact_speed_kmh"])
+    with pytest.raises(ValueError, match="twice"):
+        recipes.compare_results(few, pl.concat([pl.DataFrame(results)] * 2))
     with pytest.raises(ValueError, match="no case"):
         recipes.compare_results(few, {**results, "id": ["other"]})
 
@@ -150,6 +154,9 @@ def test_uncertain_shares_are_those_of_the_verb_that_they_replace() -> None:
     indices = {row["input"]: row for row in found.indices.to_dicts()}
     for name, index in {"gap_m": 0.080, "ego_speed_kmh": 0.168, "speed_kmh": 0.157, "lateral_speed": 0.005}.items():
         assert indices[name]["index"] == pytest.approx(index, abs=0.03)
+    # Of one input alone the index is 1: nothing else can explain the answer. RBD-FAST of SALib has 0.94 here.
+    alone = recipes.uncertain(CASE, {"gap_m": 3.0}).indices.row(0, named=True)
+    assert alone["index"] > 0.99 - alone["half_width"] and alone["half_width"] < 0.02
     assert found.draws.height == 20_000 and found.draws["answer"].null_count() == 0
 
 
@@ -176,6 +183,7 @@ def test_a_justification_has_the_scores_and_intervals_of_the_study(study: tuple[
         found = recipes.justification(lanes, key.removesuffix("-cv"), model="Reg157", criterion=criterion)
         (of,) = f1.filter(parameterization=key, criterion=criterion).to_dicts()
         scores = {row["quantity"]: row for row in found.scores.to_dicts()}
+        assert scores["recall"]["parameterization"] == key
         for name, column in {"recall": "recall", "precision": "precision", "F1": "f1"}.items():
             assert scores[name]["value"] == pytest.approx(of[column])
         if of["f1_low"] is not None:
@@ -231,6 +239,8 @@ def test_the_ratio_of_two_drivers_is_that_of_their_counts(sampled: pl.DataFrame)
     assert recipes.failure_ratio(fsm, fsm).row(0)[1:] == (1.0, 1.0, 1.0)
     with pytest.raises(ValueError, match="other cases"):
         recipes.failure_ratio(fsm, cchdm.head(10))
+    with pytest.raises(ValueError, match="filter its rows by model"):
+        recipes.failure_ratio(fsm, sampled)
 
 
 def test_a_map_counts_every_lane_once(sampled: pl.DataFrame) -> None:
@@ -247,7 +257,10 @@ def test_the_worst_lanes_have_the_fastest_contacts(sampled: pl.DataFrame) -> Non
     assert found["model"].to_list() == ["CCHDM"] * 3 + ["FSM"] * 3
     fastest = sampled.filter(model="FSM")["impact_closing_speed_mps"].drop_nulls().sort(descending=True).head(3)
     assert found["impact_closing_speed_mps"].tail(3).to_list() == fastest.to_list()
-    assert recipes.worst(sampled, 1, criterion="ttc")["min_ttc_s"].max() == 0.0
+    for criterion, column in {"ttc": "min_ttc_s", "btn": "max_btn"}.items():
+        found = recipes.worst(sampled, 1, criterion=criterion)
+        (of,) = sampled.filter(model="FSM", **{column: found[column][1]}).select(pl.max("impact_closing_speed_mps")).row(0)
+        assert found["impact_closing_speed_mps"][1] == of
 
 
 def test_failing_lanes_have_the_worst_contacts_of_all_rows(density: Path, sampled: pl.DataFrame, tmp_path: Path) -> None:
@@ -258,9 +271,11 @@ def test_failing_lanes_have_the_worst_contacts_of_all_rows(density: Path, sample
 
 
 def test_momentum_divides_the_closing_speed_and_curves_have_the_numbers_of_their_sources() -> None:
-    rows = {"contact_type": [2, 1, 2, 0], "impact_closing_speed_mps": [10.0, 10.0, -1.0, None]}
+    # The last one comes from the side, 2.67 m behind the ego's front.
+    rows = {"contact_type": [2, 1, 2, 0, 2], "impact_closing_speed_mps": [10.0, 10.0, -1.0, None, 18.1]}
+    rows["min_gap_m"] = [-0.2, -0.2, 0.0, 5.0, -2.67]
     equal, truck = recipes.delta_v(rows), recipes.delta_v(rows, other_kg=16_000)
-    assert equal["delta_v_ego_mps"].to_list() == [5.0, None, None, None]
+    assert equal["delta_v_ego_mps"].to_list() == [5.0, None, None, None, None]
     assert truck["delta_v_ego_mps"][0] == pytest.approx(10 * 16_000 / 17_500)
     mph = 0.44704
     for curve, at, risk in [

@@ -37,15 +37,15 @@ def failure_map(rows: Any, x: str, y: str, *, criterion: str = "collision", bins
 
 
 def worst(rows: Any, count: int = 20, *, criterion: str = "collision") -> pl.DataFrame:
-    """Return the worst lanes of each driver: fastest contacts, then smallest TTC; smallest TTC; or largest BTN.
+    """Return the worst lanes of each driver: fastest contacts, then smallest TTC; smallest TTC or largest BTN, then fastest contacts.
 
     `rows` are those of `sample(failures=…)`, `sample(rows=…)` or `simulate`.
     """
     with extra():
         import polars as pl
-    near = pl.col("min_ttc_s")
+    near, slow = pl.col("min_ttc_s"), -pl.col("impact_closing_speed_mps").abs()
     # The smallest is the worst.
-    order = {"collision": [-pl.col("impact_closing_speed_mps").abs(), near], "ttc": [near], "btn": [-pl.col("max_btn")]}
+    order = {"collision": [slow, near], "ttc": [near, slow], "btn": [-pl.col("max_btn"), slow]}
     lanes = table(rows).sort("model", *order[criterion], nulls_last=True, maintain_order=True)
     return lanes.group_by("model", maintain_order=True).head(count)
 
@@ -82,17 +82,22 @@ INJURY_CURVES = {
 }
 
 
-def delta_v(rows: Any, *, ego_kg: float = 1500.0, other_kg: float = 1500.0, restitution: float = 0.0) -> pl.DataFrame:
+def delta_v(
+    rows: Any, *, ego_kg: float = 1500.0, other_kg: float = 1500.0, restitution: float = 0.0, dt_s: float = 0.04
+) -> pl.DataFrame:
     """Add the changes of speed in every contact, `delta_v_ego_mps` and `delta_v_other_mps`, by conservation of momentum.
 
-    ΔV = (1 + e)·m_other/(m_own + m_other)·closing speed, of a central contact in line: null for a contact from the side and for one in
-    which the vehicles move apart. `rows` are those of `simulate` or `sample`.
+    ΔV = (1 + e)·m_other/(m_own + m_other)·closing speed, of a central contact in line: null for a contact from the side, for one of
+    vehicles that overlapped along the road by more than a time step's way before, and for one in which they move apart. `rows` are those
+    of `simulate` or `sample`; `dt_s` is the longest time step of their profile.
     """
     with extra():
         import polars as pl
     closing = pl.col("impact_closing_speed_mps").cast(pl.Float64)
     of_all = (1.0 + restitution) * closing / (ego_kg + other_kg)
-    central = pl.when((pl.col("contact_type") == 2) & (closing > 0))
+    # The box of a vehicle that comes from the side is beside the ego before it touches.
+    from_behind = pl.col("min_gap_m") >= -closing * dt_s - 0.05
+    central = pl.when((pl.col("contact_type") == 2) & (closing > 0) & from_behind)
     both = {"delta_v_ego_mps": other_kg * of_all, "delta_v_other_mps": ego_kg * of_all}
     return table(rows).with_columns(**{name: central.then(of) for name, of in both.items()})
 

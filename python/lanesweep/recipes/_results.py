@@ -38,12 +38,18 @@ class Comparison(NamedTuple):
         A row per quantity that is the first one in some cases: their number, and median, minimum and maximum of its difference
         in these cases. The quantity with the most cases leads.
     agreement : tuple of float
-        Fraction of the cases with the same answer to whether the vehicles touch, with its interval (95 %, Clopper and Pearson).
+        Fraction of the results with the same answer to whether the vehicles touch, with its interval (95 %, Clopper and Pearson).
+    missing : int
+        Number of the cases without a result.
+    ignored : list of str
+        Columns of the results that were not compared.
     """
 
     cases: pl.DataFrame
     causes: pl.DataFrame
     agreement: tuple[float, float, float]
+    missing: int
+    ignored: list[str]
 
 
 def compare_results(
@@ -62,8 +68,9 @@ def compare_results(
     with extra():
         import polars as pl
         from statsmodels.stats.proportion import proportion_confint
-    results = _as_values(table(theirs))
-    both = results.join(_lanes(table(cases), results.columns, model, profile), on="id", suffix="_ours", validate="1:1")
+    given, own = table(theirs), table(cases)
+    results = _as_values(given)
+    both = results.join(_lanes(own, results.columns, model, profile), on="id", suffix="_ours", validate="1:1")
     if both.height < results.height:
         raise ValueError(f"{results.height - both.height} results have the id of no case")
     most = {name: by for name, by in tolerances.items() if name in results.columns} | {"collision": 0.0}
@@ -80,7 +87,8 @@ def compare_results(
     ordered = pl.DataFrame(causes).filter(pl.col("cases") > 0).sort("cases", descending=True, maintain_order=True)
     agreeing = compared.filter(collision=0.0).height
     low, high = proportion_confint(agreeing, compared.height, method="beta")
-    return Comparison(compared, ordered, (agreeing / compared.height, low, high))
+    ignored = [name for name in given.columns if name not in results.columns]
+    return Comparison(compared, ordered, (agreeing / compared.height, low, high), own.height - both.height, ignored)
 
 
 def _lanes(cases: pl.DataFrame, columns: list[str], model: str, profile: PathLike) -> pl.DataFrame:
@@ -91,7 +99,7 @@ def _lanes(cases: pl.DataFrame, columns: list[str], model: str, profile: PathLik
     if "braking_s" in columns:
         keep = temporary()
         file = Path(keep.name) / "cases.parquet"
-        cases.write_parquet(file)
+        cases.drop("answer", strict=False).write_parquet(file)
         traces = (_verbs.trace(table=file, row=row + 1, models=model, profile=profile).document for row in range(len(cases)))
         braking = [next((step["t_s"] for step in of["steps"] if "braking" in (step["mark"] or "")), None) for of in traces]
         found = found.with_columns(braking_s=pl.Series(braking, dtype=pl.Float64))
@@ -104,6 +112,10 @@ def _as_values(rows: pl.DataFrame) -> pl.DataFrame:
     import polars as pl
 
     known = [name for name in TOLERANCES if name in rows.columns]
+    if absent := {"id", "collision"} - set(rows.columns):
+        raise ValueError(f"a table of results has a column {' and '.join(sorted(absent))}; there are {', '.join(rows.columns)}")
+    if not rows["id"].is_unique().all():
+        raise ValueError(f"the id {rows.filter(pl.col('id').is_duplicated())['id'][0]} occurs twice")
     found = rows.select(pl.col("id").cast(pl.String), pl.col("collision", *known).cast(pl.Float64))
     if "min_gap_m" in known:
         found = found.with_columns(pl.col("min_gap_m").clip(lower_bound=0.0))

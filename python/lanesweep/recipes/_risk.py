@@ -41,6 +41,8 @@ def failure_ratio(one: Any, other: Any, *, criterion: str = "collision", by: str
         import polars as pl
     first, second = (table(rows) for rows in (one, other))
     headway = "headway" if by == "sample" else "thw"
+    if any(rows["model"].n_unique() > 1 for rows in (first, second) if "model" in rows.columns):
+        raise ValueError("a side has several drivers: filter its rows by model")
     both = first.join(second, on=[by, headway], suffix="_other", validate="1:1", nulls_equal=True)
     if both.is_empty() or both.height < max(first.height, second.height):
         raise ValueError("the two have other cases: give one driver each, of one seed")
