@@ -8,6 +8,7 @@ use std::path::PathBuf;
 pub mod device;
 pub mod exid;
 pub mod lane_sets;
+pub mod mined;
 pub mod page;
 pub mod plans;
 pub mod program;

@@ -166,3 +166,31 @@ pub fn same(found: &Files, expected: &Files, what: &str) {
         assert!(content == &expected[name], "{what}: {name} differs");
     }
 }
+
+/// The words of a command.
+pub fn words(line: &str) -> Vec<&str> {
+    line.split_whitespace().collect()
+}
+
+/// Runs a command, as one line of words, to a good end; gives its stdout.
+pub fn ran(dir: &Path, line: &str) -> String {
+    done(dir, &words(line))
+}
+
+/// Runs a command: exit code, and stderr without the drawing.
+pub fn said(dir: &Path, line: &str) -> (i32, String) {
+    let (code, _, err) = lanesweep(dir, &words(line));
+    (code, unbroken(err.as_bytes()))
+}
+
+/// A command that ends with this exit code, prints no result, and says something.
+pub fn refused(dir: &Path, line: &str, code: i32, hint: &str) {
+    let (found, out, err) = lanesweep(dir, &words(line));
+    let err = unbroken(err.as_bytes());
+    assert!(found == code && out.is_empty() && err.contains(hint), "{line}: {found}, expected `{hint}`: {err}");
+}
+
+/// A document that a run left.
+pub fn json(path: &Path) -> serde_json::Value {
+    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+}
