@@ -2,6 +2,7 @@
 
 use std::sync::OnceLock;
 
+use crate::common::mined::{fitted, mined};
 use lanesweep::Place;
 use lanesweep::engine::{CpuBackend, Executor, Headway};
 use lanesweep::model::criterion::Criterion;
@@ -9,28 +10,17 @@ use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::Shard;
 use lanesweep::run::sampling::{EstimateRow, Estimator, Sample, SampleHeadways, SampleOptions};
-use lanesweep::scenario::DataProvenance;
-use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
-use lanesweep::stats::density::{DensityModel, FitOptions};
+use lanesweep::stats::density::DensityModel;
 use lanesweep::stats::estimate::{Search, Verdict, Warning};
-use lanesweep::traffic::mining::{MiningOptions, mine_generated};
-use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
-fn scenarios() -> &'static [Scenario] {
+fn density_of(key: &str, with_thw: bool) -> DensityModel {
     static MINED: OnceLock<Vec<Scenario>> = OnceLock::new();
-    MINED.get_or_init(|| {
-        let generator = GeneratorOptions { recordings: 30, ..GeneratorOptions::default() };
-        mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap().scenarios
-    })
+    fitted(MINED.get_or_init(|| mined(30).scenarios), Category::CutIn, key, with_thw)
 }
 
 fn density(key: &str) -> DensityModel {
-    let facts =
-        DataProvenance { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
-    let options = FitOptions { valid_draws: 1000, ..FitOptions::default() };
-    let id = Parameterization::find(Category::CutIn, key).unwrap();
-    DensityModel::fit(id, scenarios(), &facts, &options).unwrap().model
+    density_of(key, false)
 }
 
 fn sample(density: DensityModel, estimator: Estimator, headways: Vec<Headway>) -> Sample {
@@ -145,22 +135,10 @@ fn a_density_file_holds_its_scenarios_and_refuses_others() {
 /// A density that draws its headway is compared with S from its recorded gaps; under a condition nothing is compared.
 #[test]
 fn no_rate_is_sound_that_is_compared_with_nothing() {
-    let with_headway = |key: &str| {
-        let facts = DataProvenance {
-            data: "synthetic".to_owned(),
-            synthetic: true,
-            scenarios_sha256: String::new(),
-            driven: None,
-        };
-        let options = FitOptions { valid_draws: 1000, with_thw: true, ..FitOptions::default() };
-        DensityModel::fit(Parameterization::find(Category::CutIn, key).unwrap(), scenarios(), &facts, &options)
-            .unwrap()
-            .model
-    };
     let mut options = SampleOptions::new(Estimator::CRUDE, 4000, SampleHeadways::Sampled);
     options.models = vec![ModelId::Cchdm, ModelId::Fsm];
     let profile = Profile::load("paper").unwrap();
-    let drawn = rows(&Sample::plan(with_headway("2"), &profile, &options).unwrap());
+    let drawn = rows(&Sample::plan(density_of("2", true), &profile, &options).unwrap());
     for row in &drawn {
         let ratios = row.recorded.expect("S starts from its recorded gaps");
         let agrees = ratios.replayed.agrees() && ratios.sampled.unwrap().agrees();

@@ -3,24 +3,19 @@
 use lanesweep::scenario::{Category, read_scenario_file};
 use lanesweep::support::plausibility::Implausible;
 
-use crate::common::program::lanesweep;
+use crate::common::program::{done, ran, said, words};
 
 #[test]
 fn s_prime_of_other_programs_and_of_bases_of_other_folds_are_scored() {
     let dir = tempfile::tempdir().unwrap();
     let of = |name: &str| dir.path().join(name);
-    let run = |args: &[&str]| {
-        let (code, out, error) = lanesweep(dir.path(), args);
-        assert_eq!(code, 0, "{args:?}: {error}");
-        out
-    };
-    run(&["-q", "synth", "recordings", "--synth-recordings", "6"]);
-    run(&["-q", "mine", "recordings", "--out", "scenarios.jsonl"]);
-    let data = ["--scenarios", "scenarios.jsonl"];
+    ran(dir.path(), "-q synth recordings --synth-recordings 6");
+    ran(dir.path(), "-q mine recordings --out scenarios.jsonl");
     // S itself as S' of another program, in a file whose name is no key.
     std::fs::copy(of("scenarios.jsonl"), of("my same.v2.jsonl")).unwrap();
-    let external = ["--cross-validate", "--external", "my same.v2.jsonl"];
-    run(&[&["-q", "study", "--categories", "cut-in", "--out", "study"], &data[..], &external[..]].concat());
+    let study = "-q study --scenarios scenarios.jsonl --external";
+    let external = study.replace("--external", "--cross-validate --categories cut-in --out study --external");
+    done(dir.path(), &[&words(&external)[..], &["my same.v2.jsonl"]].concat());
     let variants = std::fs::read_to_string(of("study/variants.csv")).unwrap();
     let row = |name: &str| variants.lines().find(|line| line.starts_with(&format!("cut-in,{name},"))).unwrap();
     assert_eq!(row("my-same-v2"), "cut-in,my-same-v2,0,1,1,1", "{variants}");
@@ -28,8 +23,8 @@ fn s_prime_of_other_programs_and_of_bases_of_other_folds_are_scored() {
     assert_eq!(std::fs::read_to_string(of("study/folds.csv")).unwrap().lines().next(), Some("scenario,fold"));
     #[cfg(feature = "parquet")]
     {
-        run(&["-q", "mine", "recordings", "--out", "as-parquet.parquet"]);
-        run(&[&["-q", "study", "--external", "as-parquet.parquet", "--out", "parquet"], &data[..]].concat());
+        ran(dir.path(), "-q mine recordings --out as-parquet.parquet");
+        ran(dir.path(), &format!("{study} as-parquet.parquet --out parquet"));
         let variants = std::fs::read_to_string(of("parquet/variants.csv")).unwrap();
         assert!(variants.contains("LVD,as-parquet,0,1,1,1"), "{variants}");
     }
@@ -47,9 +42,7 @@ fn s_prime_of_other_programs_and_of_bases_of_other_folds_are_scored() {
         ("cut.jsonl", lines[..lines.len() / 2].to_owned(), "cut.jsonl"),
     ] {
         std::fs::write(of(name), content).unwrap();
-        let args = [&["-q", "study", "--external", name, "--out", "bad"], &data[..]].concat();
-        let (code, _, error) = lanesweep(dir.path(), &args);
-        assert!(code == 2 || code == 3, "{name}: {code} {error}");
-        assert!(error.split_whitespace().collect::<Vec<_>>().join(" ").contains(says), "{name}: {error}");
+        let (code, said) = said(dir.path(), &format!("{study} {name} --out bad"));
+        assert!((code == 2 || code == 3) && said.contains(says), "{name}: {code} {said}");
     }
 }

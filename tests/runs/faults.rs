@@ -4,32 +4,24 @@
 //! byte. What the machine does not allow (mounts, another user) is skipped loudly.
 #![cfg(unix)]
 
-use crate::common::{self, page};
+use crate::common::{self, page, program};
 mod machine;
 mod workers;
 
 use crate::common::program::{
-    self, command, done, ended, files, limited, names, start, unbroken, wait_for_run, without_times,
+    command, ended, files, limited, names, ran, said, start, unbroken, wait_for_run, without_times, words,
 };
 
 use std::path::{Path, PathBuf};
 
-/// Runs a command of the program in a folder: exit code and stderr.
-fn lanesweep(dir: &Path, args: &[&str]) -> (i32, String) {
-    let (code, _, err) = program::lanesweep(dir, args);
-    (code, unbroken(err.as_bytes()))
-}
-
 /// Nothing hidden or half-written may be left in the folder of a finished run.
-fn same(found: &Path, undisturbed: &Path, what: &str) {
-    let [found, expected] = [found, undisturbed].map(|dir| {
-        let mut files = without_times(files(dir));
-        if let Some(page) = files.get_mut("report.html") {
-            *page = page::without_host(std::str::from_utf8(page).unwrap()).into_bytes();
-        }
-        files
-    });
-    program::same(&found, &expected, what);
+fn same(found: &Path, undisturbed: &Path) {
+    let page = |(name, content): (String, Vec<u8>)| match std::str::from_utf8(&content) {
+        Ok(text) if name == "report.html" => (name, page::without_host(text).into_bytes()),
+        _ => (name, content),
+    };
+    let [found, expected] = [found, undisturbed].map(|dir| without_times(files(dir)).into_iter().map(page).collect());
+    program::same(&found, &expected, &undisturbed.display().to_string());
 }
 
 /// A folder with scenarios and a density.
@@ -46,33 +38,16 @@ fn shared() -> &'static Path {
         let _ = std::fs::remove_dir_all(&dir);
         std::fs::create_dir_all(&dir).unwrap();
         std::fs::copy(common::golden("paper_sumo_01_02_scenarios.jsonl"), dir.join("scenarios.jsonl")).unwrap();
-        let fit = ["-q", "fit", "--synth-recordings", "3", "--categories", "cut-in", "--parameterizations", "2"];
-        done(&dir, &[&fit[..], &["--out", "density.json"]].concat());
-        for (name, run) in RUNS {
-            done(&dir, &[run, &["--out", name]].concat());
-        }
+        ran(&dir, "-q fit --synth-recordings 3 --categories cut-in --parameterizations 2 --out density.json");
+        let _ = RUNS.map(|(name, run)| ran(&dir, &format!("{run} --out {name}")));
         dir
     })
 }
 
-const STUDY: &[&str] = &["-q", "study", "--scenarios", "scenarios.jsonl", "--backend", "cpu", "--threads", "1"];
+const STUDY: &str = "-q study --scenarios scenarios.jsonl --backend cpu --threads 1";
 /// Half a second or more on one thread: long enough for a journal.
-const SAMPLE: &[&str] = &[
-    "-q",
-    "sample",
-    "density.json",
-    "--samples",
-    "1000000",
-    "--thw",
-    "0.6",
-    "--models",
-    "FSM",
-    "--backend",
-    "cpu",
-    "--threads",
-    "1",
-];
-const RUNS: [(&str, &[&str]); 2] = [("study", STUDY), ("sample", SAMPLE)];
+const SAMPLE: &str = "-q sample density.json --samples 1000000 --thw 0.6 --models FSM --backend cpu --threads 1";
+const RUNS: [(&str, &str); 2] = [("study", STUDY), ("sample", SAMPLE)];
 
 impl Bench {
     fn new() -> Bench {
@@ -86,22 +61,24 @@ impl Bench {
     fn path(&self) -> &Path {
         self.dir.path()
     }
+
+    /// The same command, undisturbed, ends with the result of the undisturbed run.
+    fn ends_well(&self, name: &str, run: &str) {
+        ran(self.path(), &format!("{run} --out {name}"));
+        same(&self.path().join(name), &shared().join(name));
+    }
 }
 
 #[test]
 fn at_a_limit_of_the_size_of_files_the_run_says_so_and_ends_well_without_it() {
     let bench = Bench::new();
-    for (name, run) in RUNS {
-        let whole = shared().join(name);
-        // In blocks of 512 or 1024 bytes, as the shell counts: less than a table of the study, than a sample's journal.
-        let blocks = if name == "study" { "1" } else { "8" };
-        let command = [run, &["--out", name]].concat();
-        let (code, _, err) = limited(bench.path(), &format!("ulimit -f {blocks}"), &command);
+    // In blocks of 512 or 1024 bytes, as the shell counts: less than a table of the study, than a sample's journal.
+    for ((name, run), blocks) in RUNS.into_iter().zip([1, 8]) {
+        let line = format!("{run} --out {name}");
+        let (code, _, err) = limited(bench.path(), &format!("ulimit -f {blocks}"), &words(&line));
         let said = unbroken(err.as_bytes());
-        assert_eq!(code, 6, "{name}: {said}");
-        assert!(said.contains("File too large") && said.contains("ulimit -f"), "{said}");
-        done(bench.path(), &command);
-        same(&bench.path().join(name), &whole, name);
+        assert!(code == 6 && said.contains("File too large") && said.contains("ulimit -f"), "{code}: {said}");
+        bench.ends_well(name, run);
     }
 }
 
@@ -111,102 +88,71 @@ fn a_full_standard_output_is_told_and_the_result_is_whole() {
         return common::skipped("needs /dev/full");
     }
     let bench = Bench::new();
-    for (name, run) in RUNS {
-        let whole = shared().join(name);
-        let args = [run, &["--out", name]].concat();
-        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
-        let output = command(bench.path(), &args).stdout(full).output().unwrap();
-        let said = unbroken(&output.stderr);
-        assert_eq!(output.status.code(), Some(6), "{said}");
-        assert!(said.contains("standard output") && said.contains("No space left"), "{said}");
-        done(bench.path(), &args);
-        same(&bench.path().join(name), &whole, name);
-    }
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let study = format!("{STUDY} --out study");
+    let output = command(bench.path(), &words(&study)).stdout(full).output().unwrap();
+    let said = unbroken(&output.stderr);
+    assert_eq!(output.status.code(), Some(6), "{said}");
+    assert!(said.contains("standard output") && said.contains("No space left"), "{said}");
+    bench.ends_well("study", STUDY);
 }
 
 #[test]
 fn a_folder_that_vanishes_in_mid_run_is_told_or_made_again_and_nothing_is_claimed_that_is_lost() {
     let bench = Bench::new();
-    let long = [SAMPLE, &["--config", "run.stop_after_s=100000"]].concat();
-    let whole = shared().join("sample");
-    let out = bench.path().join("out");
-    let (mut reported, mut made_again) = (0, 0);
+    let out = bench.path().join("sample");
     for round in 0..2 {
-        let mut run = start(bench.path(), &[&long[..], &["--out", "out"]].concat());
+        let long = format!("{SAMPLE} --config run.stop_after_s=100000 --out sample");
+        let mut run = start(bench.path(), &words(&long));
         // Before its journal is begun, and after.
         let awaited = |entry: &String| if round == 0 { entry == "run.lock" } else { entry.ends_with(".journal") };
         wait_for_run(&mut run, "something is being written", || names(&out).iter().any(awaited));
         std::fs::remove_dir_all(&out).unwrap();
         let (code, err) = ended(run);
         let said = unbroken(err.as_bytes());
-        match code {
-            // It came to its end before the next record was due.
-            0 => made_again += 1,
-            6 => {
-                assert!(said.contains("out vanished") && said.contains("begins anew"), "{said}");
-                assert!(!said.contains("are done and kept"), "{said}");
-                assert!(!out.exists(), "a folder that is taken away is not made again by a journal");
-                reported += 1;
-                done(bench.path(), &[SAMPLE, &["--out", "out"]].concat());
-            }
-            other => panic!("{other:?}: {said}"),
+        // 0: it came to its end before the next record was due.
+        if code != 0 {
+            assert!(code == 6 && said.contains("sample vanished") && said.contains("begins anew"), "{code}: {said}");
+            assert!(!said.contains("are done and kept"), "{said}");
+            assert!(!out.exists(), "a folder that is taken away is not made again by a journal");
+            ran(bench.path(), &format!("{SAMPLE} --out sample"));
         }
-        same(&out, &whole, &format!("round {round}"));
+        same(&out, &shared().join("sample"));
         std::fs::remove_dir_all(&out).unwrap();
     }
-    println!("{reported} runs told of it, {made_again} made the folder again");
 }
 
 #[test]
 fn an_output_that_is_a_file_or_inside_one_is_refused_before_the_work() {
     let bench = Bench::new();
     let dir = bench.path();
-    done(dir, &["-q", "synth", "recordings", "--synth-recordings", "1", "--config", "generator.duration_s=60"]);
+    ran(dir, "-q synth recordings --synth-recordings 1 --config generator.duration_s=60");
     std::fs::write(dir.join("taken"), "mine").unwrap();
-    let commands = [
-        "study --scenarios scenarios.jsonl --out @",
-        "study --scenarios scenarios.jsonl --out @ --plan-only",
-        "study --scenarios scenarios.jsonl --out @ --shard 0/2",
-        "sample density.json --samples 1000 --out @",
-        "sample density.json --samples 1000 --out @ --shard 0/2",
-        "sample density.json --samples 1000 --out @ --estimator is",
-        "fit --scenarios scenarios.jsonl --out @",
-        "synth @",
-        "merge @",
-        "simulate --from @ --lane a/S/1.0s/FSM",
-    ];
-    for command in commands {
-        for place in ["taken", "taken/inside", "taken/far/inside"] {
-            let args: Vec<&str> = command.split(' ').map(|arg| if arg == "@" { place } else { arg }).collect();
-            let (code, said) = lanesweep(dir, &args);
-            assert!([2, 3, 6].contains(&code), "{args:?}: {code} {said}");
-            assert!(said.contains("taken"), "{args:?}: {said}");
-            let mut expected = vec!["a file is where a folder is needed"];
-            if command.contains("merge") || command.contains("--from") {
-                expected.extend(["expected the folder of a run", "there is no such folder", "there is no run here"]);
-            }
-            assert!(expected.iter().any(|text| said.contains(text)), "{args:?}: {said}");
+    let study = "study --scenarios scenarios.jsonl --out";
+    let is_file = &["a file is where a folder is needed"][..];
+    let no_run = &["expected the folder of a run", "there is no such folder", "there is no run here", is_file[0]][..];
+    for place in ["taken", "taken/inside", "taken/far/inside"] {
+        for (line, hints) in [
+            (format!("{study} {place}"), is_file),
+            (format!("{study} {place} --plan-only"), is_file),
+            (format!("{study} {place} --shard 0/2"), is_file),
+            (format!("fit --scenarios scenarios.jsonl --out {place}"), is_file),
+            (format!("merge {place}"), no_run),
+            (format!("simulate --from {place} --lane a/S/1.0s/FSM"), no_run),
+        ] {
+            let (code, said) = said(dir, &line);
+            assert!([2, 3, 6].contains(&code) && said.contains("taken"), "{line}: {code} {said}");
+            assert!(hints.iter().any(|text| said.contains(text)), "{line}: {said}");
         }
     }
-    for command in [
-        "study --scenarios scenarios.jsonl --out fresh --rows taken/lanes.csv",
-        "sample density.json --samples 1000 --out fresh --rows taken/rows.csv",
-        "mine recordings --out taken/scenarios.jsonl",
-        "fit --scenarios scenarios.jsonl --categories cut-in --parameterizations 2 --out taken/density.json",
+    for (line, hint) in [
+        (format!("{study} fresh --rows taken/lanes.csv"), is_file[0]),
+        ("mine recordings --out taken/scenarios.jsonl".to_owned(), is_file[0]),
+        (format!("{study} fresh --rows recordings"), "folder"),
+        ("mine recordings --out .".to_owned(), "folder"),
     ] {
-        let args: Vec<&str> = command.split(' ').collect();
-        let (code, said) = lanesweep(dir, &args);
-        assert_eq!(code, 6, "{args:?}: {said}");
-        assert!(said.contains("taken") && said.contains("a file is where a folder is needed"), "{args:?}: {said}");
-    }
-    for command in [
-        "study --scenarios scenarios.jsonl --out fresh --rows recordings",
-        "sample density.json --samples 1000 --out fresh --rows recordings",
-        "mine recordings --out .",
-    ] {
-        let args: Vec<&str> = command.split(' ').collect();
-        let (code, said) = lanesweep(dir, &args);
-        assert!([2, 6].contains(&code) && said.contains("folder"), "{args:?}: {code} {said}");
+        let (code, said) = said(dir, &line);
+        assert!([2, 6].contains(&code) && said.contains(hint), "{line}: {code} {said}");
     }
     assert_eq!(std::fs::read_to_string(dir.join("taken")).unwrap(), "mine");
 }

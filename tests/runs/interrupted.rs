@@ -3,11 +3,11 @@
 
 use std::io::{BufRead, BufReader};
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::common::program::{self, PATIENCE, done, kill, send, start, wait_for_run, wait_until};
+use crate::common::program::{self, PATIENCE, kill, names, ran, send, start, wait_for_run, wait_until, words};
 use lanesweep::Error;
 use lanesweep::cli::signals;
 use lanesweep::engine::verify::{RandomOptions, random_plan};
@@ -16,9 +16,8 @@ use lanesweep::model::profile::Profile;
 use lanesweep::support::cancel::Cancel;
 
 /// The hidden, unfinished files of a folder.
-fn unfinished(dir: &Path) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(dir).unwrap().map(|entry| entry.unwrap().path());
-    entries.filter(|path| path.extension().is_some_and(|extension| extension == "part")).collect()
+fn unfinished(dir: &Path) -> Vec<String> {
+    names(dir).into_iter().filter(|name| name.ends_with(".part")).collect()
 }
 
 /// Exit code and stderr of a run that ends within the patience of the tests.
@@ -27,53 +26,26 @@ fn ended(mut run: Child) -> (i32, String) {
     program::ended(run)
 }
 
-/// Estimates of a folder, without what belongs to the machine and the command.
-fn estimates(dir: &Path) -> serde_json::Value {
-    let text = std::fs::read(dir.join("estimate.json")).unwrap();
-    let mut file: serde_json::Value = serde_json::from_slice(&text).unwrap();
-    for of_command in ["host", "settings"] {
-        file.as_object_mut().unwrap().remove(of_command).unwrap();
-    }
-    file
-}
-
 #[test]
 fn importance_sampling_that_is_killed_resumes_with_its_search_to_the_same_bits() {
     let dir = tempfile::tempdir().unwrap();
-    let fit = "-q fit --synth-recordings 2 --categories cut-in --parameterizations 2 --config fit.valid_draws=1000 \
-               --out d.json";
-    done(dir.path(), &fit.split_whitespace().collect::<Vec<_>>());
-    let run = [
-        "-q",
-        "--threads",
-        "1",
-        "sample",
-        "d.json",
-        "--estimator",
-        "is",
-        "--models",
-        "FSM,RSS",
-        "--thw",
-        "0.6",
-        "--samples",
-        "200000",
-    ];
-    let run = |out| [&run[..], &["--backend", "cpu", "--out", out]].concat();
-    done(dir.path(), &run("whole"));
-    let (killed, search) = (dir.path().join("killed"), dir.path().join("killed/search.json"));
-    let journal = || {
-        let names = std::fs::read_dir(&killed).into_iter().flatten().flatten().map(|entry| entry.path());
-        names.into_iter().find(|path| path.extension().is_some_and(|extension| extension == "journal"))
-    };
+    let dir = dir.path();
+    let small = "--synth-recordings 2 --categories cut-in --parameterizations 2 --config fit.valid_draws=1000";
+    ran(dir, &format!("-q fit {small} --out d.json"));
+    let run =
+        "-q --threads 1 sample d.json --estimator is --models FSM,RSS --thw 0.6 --samples 200000 --backend cpu --out";
+    ran(dir, &format!("{run} whole"));
+    let (killed, search) = (dir.join("killed"), dir.join("killed/search.json"));
+    let journal = || names(&killed).into_iter().find(|name| name.ends_with(".journal"));
+    let length = || journal().and_then(|name| std::fs::metadata(killed.join(name)).ok()).map_or(0, |file| file.len());
     let (mut kills, mut found) = (0, Vec::new());
     loop {
-        let mut child = start(dir.path(), &run("killed"));
-        let before = journal().and_then(|path| std::fs::metadata(path).ok()).map_or(0, |file| file.len());
+        let mut child = start(dir, &words(&format!("{run} killed")));
+        let before = length();
         let mut status = None;
         wait_until("the journal grows, or the run ends", || {
             status = child.try_wait().unwrap();
-            let now = journal().and_then(|path| std::fs::metadata(path).ok()).map_or(0, |file| file.len());
-            status.is_some() || (kills < 2 && now > before.max(100))
+            status.is_some() || (kills < 2 && length() > before.max(100))
         });
         if let Some(status) = status {
             assert!(status.success());
@@ -85,37 +57,34 @@ fn importance_sampling_that_is_killed_resumes_with_its_search_to_the_same_bits()
     }
     assert!(kills > 0, "the run ended before its journal was seen");
     assert!(found.windows(2).all(|two| two[0] == two[1]), "the search is kept");
-    assert_eq!(estimates(&killed), estimates(&dir.path().join("whole")));
     assert!(!search.exists() && journal().is_none(), "nothing of the run is left");
-    let proposal = |dir: &Path| std::fs::read(dir.join("proposal.json")).unwrap();
-    assert_eq!(proposal(&killed), proposal(&dir.path().join("whole")));
+    super::parts::same(&killed, &dir.join("whole"));
 }
 
 /// A study that is sent `signal` while it writes its lanes.
 fn study_interrupted_by(signal: &str) -> i32 {
     let dir = tempfile::tempdir().unwrap();
-    let lanes = dir.path().join("lanes.csv");
-    std::fs::write(&lanes, "of an earlier run").unwrap();
-    let study = "-q --threads 1 study --config study.reference=true --synth-recordings 2 --config generator.duration_s=300 --out out --rows lanes.csv";
-    let mut study = start(dir.path(), &study.split(' ').collect::<Vec<_>>());
+    let dir = dir.path();
+    std::fs::write(dir.join("lanes.csv"), "of an earlier run").unwrap();
+    let small = "--config study.reference=true --synth-recordings 2 --config generator.duration_s=300";
+    let mut study = start(dir, &words(&format!("-q --threads 1 study {small} --out out --rows lanes.csv")));
     wait_for_run(&mut study, "rows are being written", || {
-        let in_middle = |path: &PathBuf| std::fs::metadata(path).is_ok_and(|file| file.len() > 0);
-        unfinished(dir.path()).iter().any(in_middle)
+        unfinished(dir).iter().any(|name| std::fs::metadata(dir.join(name)).is_ok_and(|file| file.len() > 0))
     });
-    let name = unfinished(dir.path())[0].file_name().unwrap().to_str().unwrap().to_owned();
-    assert!(name.starts_with(".lanesweep-lanes.csv-"), "{name}");
+    assert!(unfinished(dir)[0].starts_with(".lanesweep-lanes.csv-"), "{:?}", unfinished(dir));
     send(signal, study.id());
     let (code, _) = ended(study);
-    assert_eq!(unfinished(dir.path()), Vec::<PathBuf>::new(), "after {signal}");
-    assert_eq!(std::fs::read_to_string(&lanes).unwrap(), "of an earlier run", "what was there stays");
-    assert!(!dir.path().join("out/run.lock").exists(), "the lock goes, whatever else stays");
+    assert!(unfinished(dir).is_empty(), "after {signal}: {:?}", unfinished(dir));
+    let lanes = std::fs::read_to_string(dir.join("lanes.csv")).unwrap();
+    assert_eq!(lanes, "of an earlier run", "what was there stays");
+    assert!(!dir.join("out/run.lock").exists(), "the lock goes, whatever else stays");
     code
 }
 
 /// Ten scenarios of 100 s, as a file.
-fn long_scenarios(dir: &Path) -> PathBuf {
+fn long_scenarios(path: &Path) {
     let golden = std::fs::read_to_string(crate::common::golden("paper_sumo_01_02_scenarios.jsonl")).unwrap();
-    let mut scenario: serde_json::Value = serde_json::from_str(golden.lines().next().unwrap()).unwrap();
+    let mut scenario: serde_json::Value = golden.lines().next().unwrap().parse().unwrap();
     let samples = 2500;
     let speeds: Vec<f64> = (0..samples).map(|k| 25.0 + f64::from(k % 100) / 100.0).collect();
     let lateral: Vec<f64> = (0..samples).map(|k| 3.5 - 3.5 * f64::from(k) / f64::from(samples)).collect();
@@ -126,20 +95,18 @@ fn long_scenarios(dir: &Path) -> PathBuf {
         scenario["id"] = format!("long-{k}").into();
         format!("{scenario}\n")
     };
-    let scenarios = dir.join("long.jsonl");
-    std::fs::write(&scenarios, (0..10).map(line).collect::<String>()).unwrap();
-    scenarios
+    std::fs::write(path, (0..10).map(line).collect::<String>()).unwrap();
 }
 
 #[test]
 fn a_signal_ends_a_run_within_five_seconds_also_in_its_first_chunk() {
     let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
     // The first chunk alone, a scenario, takes 15 s.
-    let scenarios = long_scenarios(dir.path());
-    let study = "-q --threads 1 study --config study.reference=true --dt 0.0001 --out out --scenarios";
-    let study = [&study.split(' ').collect::<Vec<_>>()[..], &[scenarios.to_str().unwrap()]].concat();
-    let mut study = start(dir.path(), &study);
-    wait_for_run(&mut study, "the folder is locked", || dir.path().join("out/run.lock").exists());
+    long_scenarios(&dir.join("long.jsonl"));
+    let long = "--config study.reference=true --dt 0.0001 --scenarios long.jsonl --out out";
+    let mut study = start(dir, &words(&format!("-q --threads 1 study {long}")));
+    wait_for_run(&mut study, "the folder is locked", || dir.join("out/run.lock").exists());
     // The first chunk begins.
     std::thread::sleep(Duration::from_millis(500));
     send("TERM", study.id());
@@ -149,15 +116,15 @@ fn a_signal_ends_a_run_within_five_seconds_also_in_its_first_chunk() {
     // A second for a machine that is busy with other tests.
     assert!(waited < Duration::from_secs(6), "{waited:?}: {said}");
     assert!(code == 75 && said.contains("the same command continues"), "{code:?}: {said}");
-    assert!(!dir.path().join("out/run.lock").exists(), "the lock goes");
+    assert!(!dir.join("out/run.lock").exists(), "the lock goes");
 }
 
 #[test]
 fn a_run_without_a_journal_that_is_interrupted_leaves_nothing() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("out");
-    let map = "-q --threads 1 map cut-in --backend cpu --preset jrc --dt 0.001 --out out";
-    let mut map = start(dir.path(), &map.split(' ').collect::<Vec<_>>());
+    let map = words("-q --threads 1 map cut-in --backend cpu --preset jrc --dt 0.001 --out out");
+    let mut map = start(dir.path(), &map);
     wait_for_run(&mut map, "the folder is locked", || out.join("run.lock").exists());
     send("INT", map.id());
     assert_eq!((ended(map).0, out.exists()), (128 + 2, false));
@@ -166,8 +133,7 @@ fn a_run_without_a_journal_that_is_interrupted_leaves_nothing() {
 #[test]
 fn a_study_that_is_interrupted_leaves_no_half_written_file() {
     // Its counts are kept: the same command continues.
-    assert_eq!(study_interrupted_by("TERM"), 75);
-    assert_eq!(study_interrupted_by("INT"), 75);
+    assert_eq!(["TERM", "INT"].map(study_interrupted_by), [75, 75]);
     // What a closed terminal sends; a test that was itself started by `nohup` hands that down.
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let ignored = status.lines().find_map(|line| u64::from_str_radix(line.strip_prefix("SigIgn:")?.trim(), 16).ok());

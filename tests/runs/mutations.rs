@@ -2,17 +2,16 @@
 //! `LANESWEEP_MUTATED_INPUTS=2000 cargo test --release --test runs mutations:: -- --nocapture`.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use super::parts::{SAMPLE, STUDY, density, weighted};
 use crate::common::plans::mixed;
-use crate::common::program::{Files, done, files, lanesweep, without_host};
+use crate::common::program::{Files, files, json, lanesweep, ran, without_host, words};
 use sha2::{Digest, Sha256};
 
 /// A file that is changed, and the command that reads it; the results lie in the folder.
 struct Input {
     file: &'static str,
-    reader: Vec<&'static str>,
+    reader: String,
     results: &'static str,
 }
 
@@ -41,9 +40,8 @@ fn changed(whole: &[u8], random: u64) -> (Vec<u8>, &'static str) {
             "another digit"
         }
         _ => {
-            let lines: Vec<&[u8]> = whole.split_inclusive(|byte| *byte == b'\n').collect();
+            let mut lines: Vec<&[u8]> = whole.split_inclusive(|byte| *byte == b'\n').collect();
             let (a, b) = ((random >> 16) as usize % lines.len(), (random >> 32) as usize % lines.len());
-            let mut lines = lines;
             lines.swap(a, b);
             bytes = lines.concat();
             "two lines exchanged"
@@ -68,14 +66,11 @@ fn changed_files_of_a_run_are_refused_or_have_no_effect() {
     let dir = dir.path();
     density(dir);
     let weighted = weighted(dir);
-    for (run, name) in [(&STUDY[..], "study"), (&SAMPLE, "sample"), (&weighted, "is")] {
-        for shard in ["0/2", "1/2"] {
-            done(dir, &[run, &["--shard", shard, "--out", name]].concat());
-        }
+    for (run, name) in [(STUDY, "study"), (SAMPLE, "sample"), (&weighted, "is")] {
+        let _ = ["0/2", "1/2"].map(|shard| ran(dir, &format!("{run} --shard {shard} --out {name}")));
     }
     // A journal of a shard: a part's segments as its records.
-    let part: serde_json::Value =
-        serde_json::from_slice(&std::fs::read(dir.join("sample/part-00000-of-00002.json")).unwrap()).unwrap();
+    let part = json(&dir.join("sample/part-00000-of-00002.json"));
     let (content, engine) = (&part["content"], &part["engine"]);
     let head = serde_json::json!({
         "lanesweep_journal": 4, "engine": engine, "run_sha256": content["run_sha256"], "units": content["units"],
@@ -87,25 +82,21 @@ fn changed_files_of_a_run_are_refused_or_have_no_effect() {
     let journal = "journal/part-00000-of-00002.journal";
     std::fs::write(dir.join(journal), journal_of(&lines)).unwrap();
 
-    let merge = |results| vec!["-q", "merge", results];
-    let sample = ["-q", "sample", "densities/cut-in-2.json", "--samples", "200", "--thw", "0.6", "--backend", "cpu"];
+    let merge = |file, results| Input { file, reader: format!("-q merge {results}"), results };
+    let few = "-q sample densities/cut-in-2.json --samples 200 --thw 0.6 --backend cpu --out few".to_owned();
     let inputs = [
-        Input { file: "study/plan.json", reader: merge("study"), results: "study" },
-        Input { file: "study/part-00000-of-00002.json", reader: merge("study"), results: "study" },
-        Input { file: "sample/plan.json", reader: merge("sample"), results: "sample" },
-        Input { file: "sample/part-00001-of-00002.json", reader: merge("sample"), results: "sample" },
-        Input { file: "is/plan.json", reader: merge("is"), results: "is" },
-        Input { file: "is/part-00000-of-00002.json", reader: merge("is"), results: "is" },
-        Input { file: "densities/cut-in-2.json", reader: [&sample[..], &["--out", "few"]].concat(), results: "few" },
-        Input {
-            file: journal,
-            reader: [&SAMPLE[..], &["--shard", "0/2", "--out", "journal"]].concat(),
-            results: "journal",
-        },
+        merge("study/plan.json", "study"),
+        merge("study/part-00000-of-00002.json", "study"),
+        merge("sample/plan.json", "sample"),
+        merge("sample/part-00001-of-00002.json", "sample"),
+        merge("is/plan.json", "is"),
+        merge("is/part-00000-of-00002.json", "is"),
+        Input { file: "densities/cut-in-2.json", reader: few, results: "few" },
+        Input { file: journal, reader: format!("{SAMPLE} --shard 0/2 --out journal"), results: "journal" },
     ];
     let whole: Vec<Vec<u8>> = inputs.iter().map(|input| std::fs::read(dir.join(input.file)).unwrap()).collect();
     let outcome = |input: &Input| {
-        let (code, _, err) = lanesweep(dir, &input.reader);
+        let (code, _, err) = lanesweep(dir, &words(&input.reader));
         if input.file == journal {
             // The part that comes of it.
             let part = std::fs::read_to_string(dir.join("journal/part-00000-of-00002.json")).unwrap_or_default();
@@ -123,17 +114,13 @@ fn changed_files_of_a_run_are_refused_or_have_no_effect() {
         let at = (k % inputs.len() as u64) as usize;
         let (input, random) = (&inputs[at], mixed(41, k));
         let (bytes, what) = changed(&whole[at], random);
-        write(&dir.join(input.file), &bytes);
+        std::fs::write(dir.join(input.file), &bytes).unwrap();
         let (code, err, found) = outcome(input);
         let what = format!("change {k}: {what} in {}: {code} {err}", input.file);
         assert!([0, 2, 3].contains(&code), "{what}");
         assert!(code != 0 || (code, &found) == (expected[at].0, &expected[at].2), "{what}");
         *codes.entry(code).or_default() += 1;
-        write(&dir.join(input.file), &whole[at]);
+        std::fs::write(dir.join(input.file), &whole[at]).unwrap();
     }
     println!("{count} changes, by exit status: {codes:?}");
-}
-
-fn write(path: &Path, bytes: &[u8]) {
-    std::fs::write(path, bytes).unwrap();
 }

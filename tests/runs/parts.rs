@@ -1,79 +1,59 @@
 //! Runs in parts: whatever the number and order of shards, and wherever a run was interrupted, the result is that of
-//! the undisturbed run, byte for byte; a folder that cannot give it says what is missing.
+//! the undisturbed run, byte for byte; a folder that cannot give it says what is missing. Missing and doubled parts are in
+//! `run/parts/folder.rs`, damaged files in `run/parts/sealed.rs`, intervals of a plan in `run/study/read.rs`.
 
-use crate::common::program::{self, done, flat, kill, lanesweep, limited, start, wait_for_run, without_host};
+use crate::common::program::{
+    self, flat, json, kill, lanesweep, limited, ran, refused, start, unbroken, wait_for_run, without_host, words,
+};
 use lanesweep::engine::ENGINE_VERSION;
 
 use std::path::Path;
 
-fn same(a: &Path, b: &Path) {
+pub fn same(a: &Path, b: &Path) {
     let [found, expected] = [a, b].map(|dir| without_host(program::files(dir)));
     program::same(&found, &expected, &format!("{} and {}", a.display(), b.display()));
 }
 
-pub const STUDY: [&str; 7] = ["-q", "study", "--synth-recordings", "2", "--published", "--backend", "cpu"];
+pub const STUDY: &str = "-q study --synth-recordings 2 --published --backend cpu";
+pub const SAMPLE: &str = "-q sample densities/cut-in-2.json --samples 30000 --thw 0.6 --backend cpu";
 
 pub fn density(dir: &Path) {
-    let fit = ["-q", "fit", "--synth-recordings", "3", "--categories", "cut-in", "--parameterizations", "2"];
-    done(dir, &[&fit[..], &["--out", "densities"]].concat());
+    ran(dir, "-q fit --synth-recordings 3 --categories cut-in --parameterizations 2 --out densities");
 }
 
-pub const SAMPLE: [&str; 9] =
-    ["-q", "sample", "densities/cut-in-2.json", "--samples", "30000", "--thw", "0.6", "--backend", "cpu"];
-
 /// Importance sampling that can be split: with a proposal of a run before.
-pub fn weighted(dir: &Path) -> Vec<&'static str> {
-    done(dir, &[&SAMPLE[..], &["--estimator", "is", "--models", "RSS", "--out", "pilot"]].concat());
-    [&SAMPLE[..], &["--estimator", "is", "--proposal", "pilot/proposal.json", "--models", "RSS,FSM"]].concat()
+pub fn weighted(dir: &Path) -> String {
+    ran(dir, &format!("{SAMPLE} --estimator is --models RSS --out pilot"));
+    format!("{SAMPLE} --estimator is --proposal pilot/proposal.json --models RSS,FSM")
 }
 
 #[test]
 fn a_study_in_shards_is_the_study_in_one_piece() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    let whole = done(dir, &[&STUDY[..], &["--out", "whole"]].concat());
+    let whole = ran(dir, &format!("{STUDY} --out whole"));
     // Each makes the plan itself; in another order.
-    for shard in ["2/3", "0/3", "1/3"] {
-        done(dir, &[&STUDY[..], &["--out", "three", "--shard", shard]].concat());
-    }
-    assert_eq!(done(dir, &["-q", "merge", "three"]), whole);
+    let shard = |shard: &str| ran(dir, &format!("{STUDY} --out three --shard {shard}"));
+    let _ = ["2/3", "0/3", "1/3"].map(shard);
+    assert_eq!(ran(dir, "-q merge three"), whole);
     same(&dir.join("whole"), &dir.join("three"));
     // A second merge changes nothing, and a finished part is left alone.
     let part = dir.join("three/part-00001-of-00003.json");
     let before = std::fs::metadata(&part).unwrap().modified().unwrap();
-    done(dir, &[&STUDY[..], &["--out", "three", "--shard", "1/3"]].concat());
+    shard("1/3");
     assert_eq!(std::fs::metadata(&part).unwrap().modified().unwrap(), before);
-    done(dir, &["-q", "merge", "three"]);
+    ran(dir, "-q merge three");
     same(&dir.join("whole"), &dir.join("three"));
     // From one plan: the data are not read again. Shards without a unit are in `run/parts/folder.rs`.
-    done(dir, &[&STUDY[..], &["--out", "plan", "--plan-only"]].concat());
+    ran(dir, &format!("{STUDY} --out plan --plan-only"));
     let read = |path: &str| std::fs::read(dir.join(path)).unwrap();
     assert!(read("whole/run-plan.json") == read("plan/plan.json"), "the plan that a whole run leaves is the same file");
-    for shard in 0..7 {
-        let shard = format!("{shard}/7");
-        done(
-            dir,
-            &["-q", "study", "--plan", "plan/plan.json", "--out", "seven", "--shard", &shard, "--backend", "cpu"],
-        );
-    }
-    assert_eq!(done(dir, &["-q", "merge", "seven"]), whole);
+    let planned = "-q study --plan plan/plan.json --backend cpu --out";
+    (0..7).for_each(|shard| drop(ran(dir, &format!("{planned} seven --shard {shard}/7"))));
+    assert_eq!(ran(dir, "-q merge seven"), whole);
     same(&dir.join("whole"), &dir.join("seven"));
-    assert_eq!(done(dir, &["-q", "study", "--plan", "plan/plan.json", "--out", "planned", "--backend", "cpu"]), whole);
+    assert_eq!(ran(dir, &format!("{planned} planned")), whole);
     same(&dir.join("whole"), &dir.join("planned"));
-}
-
-#[test]
-fn samples_in_shards_are_the_run_in_one_piece_with_its_convergence() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    density(dir);
-    let whole = done(dir, &[&SAMPLE[..], &["--out", "whole"]].concat());
-    for shard in ["6/7", "0/7", "3/7", "1/7", "5/7", "2/7", "4/7"] {
-        done(dir, &[&SAMPLE[..], &["--out", "seven", "--shard", shard]].concat());
-    }
-    assert_eq!(done(dir, &["-q", "merge", "seven"]), whole);
-    same(&dir.join("whole"), &dir.join("seven"));
-    assert!(dir.join("seven/convergence.svg").exists());
 }
 
 #[test]
@@ -81,55 +61,36 @@ fn a_folder_that_cannot_give_a_result_says_why_and_what_makes_it() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     density(dir);
-    let refused = |args: &[&str], code: i32, said: &[&str]| {
-        let (found, out, err) = lanesweep(dir, args);
-        assert_eq!(found, code, "{args:?}: {err}");
-        for said in said {
-            assert!(flat(&err).contains(said), "{args:?}: {err}");
-        }
-        assert!(out.is_empty(), "{out}");
-    };
     std::fs::create_dir(dir.join("empty")).unwrap();
-    refused(&["merge", "empty"], 3, &["plan.json is missing"]);
-    refused(&["merge", "nowhere"], 3, &["no such folder"]);
+    refused(dir, "merge empty", 3, "plan.json is missing");
+    refused(dir, "merge nowhere", 3, "no such folder");
     std::fs::write(dir.join("empty/run.json"), "{}").unwrap();
-    refused(&["merge", "empty"], 3, &["an unsplit run"]);
-    let shard = |shard: &str, out: &str| done(dir, &[&SAMPLE[..], &["--out", out, "--shard", shard]].concat());
-    shard("0/3", "p");
-    shard("2/3", "p");
-    refused(&["merge", "p"], 3, &["10000 of 30000 units are missing", "--plan p/plan.json --shard 1/3 --out p"]);
-    shard("1/3", "p");
-    shard("0/1", "p");
-    refused(&["merge", "p"], 3, &["doubled"]);
-    std::fs::remove_file(dir.join("p/part-00000-of-00001.json")).unwrap();
-    // Damaged: one byte.
-    let part = dir.join("p/part-00001-of-00003.json");
+    refused(dir, "merge empty", 3, "an unsplit run");
+    ran(dir, &format!("{SAMPLE} --out p --shard 0/2"));
+    refused(dir, "merge p", 3, "15000 of 30000 units are missing");
+    refused(dir, "merge p", 3, "--plan p/plan.json --shard 1/2 --out p");
+    ran(dir, &format!("{SAMPLE} --out p --shard 1/2"));
+    let part = dir.join("p/part-00001-of-00002.json");
     let whole = std::fs::read(&part).unwrap();
+    // The same interval of another run, damaged in one byte, another part of this run.
+    ran(dir, &format!("{SAMPLE} --out q --seed 8 --shard 1/2"));
+    let read = |name: &str| std::fs::read(dir.join(name)).unwrap();
     let mut damaged = whole.clone();
-    let middle = damaged.len() / 2;
-    damaged[middle] ^= 1;
-    std::fs::write(&part, &damaged).unwrap();
-    refused(&["merge", "p"], 3, &["part-00001-of-00003.json", "--shard 1/3"]);
-    std::fs::write(&part, &whole[..middle]).unwrap();
-    refused(&["merge", "p"], 3, &["part-00001-of-00003.json", "no whole part"]);
-    // Foreign: the same interval of another run.
-    let other = [&SAMPLE[..], &["--out", "q", "--seed", "8", "--shard", "1/3"]].concat();
-    done(dir, &other);
-    std::fs::copy(dir.join("q/part-00001-of-00003.json"), &part).unwrap();
-    refused(&["merge", "p"], 3, &["foreign"]);
-    // Under another part's name.
-    std::fs::write(&part, std::fs::read(dir.join("p/part-00000-of-00003.json")).unwrap()).unwrap();
-    refused(&["merge", "p"], 3, &["its name stands for"]);
+    damaged[whole.len() / 2] ^= 1;
+    for (content, hint) in [
+        (read("q/part-00001-of-00002.json"), "foreign"),
+        (damaged, "--shard 1/2"),
+        (read("p/part-00000-of-00002.json"), "its name stands for"),
+    ] {
+        std::fs::write(&part, content).unwrap();
+        refused(dir, "merge p", 3, hint);
+    }
     std::fs::write(&part, &whole).unwrap();
-    done(dir, &["-q", "merge", "p"]);
-    // Another run into the same folder.
-    let other = [&SAMPLE[1..], &["--out", "p", "--seed", "8", "--shard", "1/3"]].concat();
-    refused(&other, 3, &["holds the plan of another run"]);
+    ran(dir, "-q merge p");
+    refused(dir, &format!("{SAMPLE} --out p --seed 8 --shard 1/2"), 3, "holds the plan of another run");
     // Of a plan, nothing but what does not change the run.
-    refused(&["study", "--plan", "p/plan.json", "--seed", "3"], 2, &["cannot be used with"]);
-    refused(&["study", "--plan", "p/plan.json", "--out", "x"], 3, &["a `study plan` is needed"]);
-    std::fs::write(dir.join("p/plan.json"), "{}").unwrap();
-    refused(&["merge", "p"], 3, &["no whole file of a run in parts"]);
+    refused(dir, "study --plan p/plan.json --seed 3", 2, "cannot be used with");
+    refused(dir, "study --plan p/plan.json --out x", 3, "a `study plan` is needed");
 }
 
 /// Replaces the first occurrence of a text in a file.
@@ -139,122 +100,59 @@ fn edit(path: &Path, from: &str, to: &str) {
     std::fs::write(path, [&bytes[..at], to.as_bytes(), &bytes[at + from.len()..]].concat()).unwrap();
 }
 
-/// Two commands in one folder must be refused with status 3 and these words.
-fn refused(dir: &Path, args: &[&str], said: &str) {
-    let (code, out, err) = lanesweep(dir, args);
-    assert!(code == 3 && out.is_empty() && flat(&err).contains(said), "{args:?} gave {code}: {err}");
-}
-
 #[test]
-fn files_of_another_engine_or_an_earlier_version_are_neither_merged_nor_continued() {
+fn files_of_another_engine_are_neither_merged_nor_continued_nor_looked_at() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     density(dir);
     let (own, other) = (ENGINE_VERSION, ENGINE_VERSION + 1);
-    let (engine, another) = (format!("\"engine\":{own},"), format!("\"engine\":{other},"));
     let is_of_another = format!("of engine {other}, this program has engine {own}");
-    for (run, name) in [(&STUDY[..], "study"), (&SAMPLE, "sample")] {
-        let shard = |shard: &'static str| [run, &["--out", name, "--shard", shard]].concat();
-        let _ = ["0/2", "1/2"].map(|of| done(dir, &shard(of)));
-        for file in ["part-00001-of-00002.json", "plan.json"] {
+    for (run, name, record) in [(STUDY, "study", "run.json"), (SAMPLE, "sample", "estimate.json")] {
+        let shard = |shard: &str| format!("{run} --out {name} --shard {shard}");
+        let _ = ["0/2", "1/2"].map(|of| ran(dir, &shard(of)));
+        let merge = format!("-q merge {name}");
+        let planned = format!("{} --plan {name}/plan.json --out x", words(run)[1]);
+        for (file, reader) in [("part-00001-of-00002.json", shard("1/2")), ("plan.json", planned)] {
             let path = dir.join(name).join(file);
             let whole = std::fs::read(&path).unwrap();
-            edit(&path, &engine, &another);
-            refused(dir, &["merge", name], &is_of_another);
-            if file != "plan.json" {
-                refused(dir, &shard("1/2"), &is_of_another);
-            } else {
-                let plan = format!("{name}/plan.json");
-                refused(dir, &[run[1], "--plan", &plan, "--out", "x"], &is_of_another);
-            }
-            // As versions before engines wrote it, all in one line.
-            let earlier = r#""version":1,"sha256":"00","content":"#;
-            std::fs::write(&path, &whole).unwrap();
-            edit(&path, &format!("\"version\":3,{engine}"), earlier);
-            refused(dir, &["merge", name], "its version is 1, this program reads 3");
-            if file == "plan.json" {
-                let plan = format!("{name}/plan.json");
-                let said = format!("{plan}: its version is 1, this program reads 3");
-                refused(dir, &[run[1], "--plan", &plan, "--out", "x"], &said);
-            }
+            edit(&path, &format!("\"engine\":{own},"), &format!("\"engine\":{other},"));
+            let _ = [&merge, &reader].map(|line| refused(dir, line, 3, &is_of_another));
             std::fs::write(&path, &whole).unwrap();
         }
-        done(dir, &["-q", "merge", name]);
+        ran(dir, &merge);
+        // The records of whole runs say it too.
+        assert_eq!(json(&dir.join(name).join(record))["engine"], own);
     }
-    // The records of whole runs say it too.
-    let record =
-        |name: &str| -> serde_json::Value { serde_json::from_slice(&std::fs::read(dir.join(name)).unwrap()).unwrap() };
-    assert_eq!(
-        (&record("study/run.json")["engine"], &record("sample/estimate.json")["engine"]),
-        (&own.into(), &own.into())
-    );
-    let lane = ["simulate", "--from", "sample", "--lane", "#0/2/0.6s/FSM"];
-    done(dir, &lane);
+    let lane = "simulate --from sample --lane #0/2/0.6s/FSM";
+    ran(dir, lane);
     edit(&dir.join("sample/estimate.json"), &format!("\"engine\": {own}"), &format!("\"engine\": {other}"));
-    refused(dir, &lane, &is_of_another);
-}
-
-#[test]
-fn a_shard_reads_its_interval_of_the_plan_and_the_merge_none() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    // More scenarios than stand under one checksum.
-    let study = STUDY.map(|word| if word == "2" { "8" } else { word });
-    done(dir, &[&study[..], &["--plan-only", "--out", "p"]].concat());
-    let path = dir.join("p/plan.json");
-    let whole = std::fs::read(&path).unwrap();
-    let mut damaged = whole.clone();
-    *damaged.last_mut().unwrap() ^= 1;
-    std::fs::write(&path, &damaged).unwrap();
-    let shard =
-        |of: &'static str| ["-q", "study", "--plan", "p/plan.json", "--shard", of, "--out", "p", "--backend", "cpu"];
-    done(dir, &shard("0/3"));
-    refused(dir, &shard("2/3"), "are damaged: their checksum does not match");
-    refused(dir, &["-q", "study", "--plan", "p/plan.json", "--out", "x"], "are damaged");
-    // Cut off, or with something behind it: whatever the interval.
-    for wrong in [&whole[..whole.len() - 1], &[&whole[..], b"x"].concat()] {
-        std::fs::write(&path, wrong).unwrap();
-        refused(dir, &shard("1/3"), "cut off or added to");
-    }
-    std::fs::write(&path, &whole).unwrap();
-    let _ = ["1/3", "2/3"].map(|of| done(dir, &shard(of)));
-    done(dir, &["-q", "merge", "p"]);
+    refused(dir, lane, 3, &is_of_another);
 }
 
 #[test]
 fn a_damaged_plan_is_whole_again_after_the_command_that_its_message_names() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    density(dir);
-    for (run, name) in [(&STUDY[..], "study"), (&SAMPLE, "sample")] {
-        let again = [run, &["--plan-only", "--out", name]].concat();
-        done(dir, &again);
-        let path = dir.join(name).join("plan.json");
-        let whole = std::fs::read(&path).unwrap();
-        let mut damaged = vec![[&whole[..], b"x"].concat()];
-        if name == "study" {
-            let mut changed = whole.clone();
-            *changed.last_mut().unwrap() ^= 1;
-            damaged.extend([changed, whole[..whole.len() - 1].to_vec()]);
-        }
-        for bytes in damaged {
-            std::fs::write(&path, &bytes).unwrap();
-            let plan = format!("{name}/plan.json");
-            let (code, _, err) = lanesweep(dir, &[run[1], "--plan", &plan, "--out", "x"]);
-            assert!(code == 3 && err.contains(&plan), "{err}");
-            done(dir, &again);
-            assert!(std::fs::read(&path).unwrap() == whole, "{name}");
-        }
-        // What stands before the records names the run: another one's plan is never written over.
-        std::fs::write(&path, &whole[..whole.len().min(1000)]).unwrap();
-        refused(dir, &again, "this folder holds the plan of another run");
+    let again = format!("{STUDY} --plan-only --out study");
+    ran(dir, &again);
+    let path = dir.join("study/plan.json");
+    let whole = std::fs::read(&path).unwrap();
+    let mut changed = whole.clone();
+    *changed.last_mut().unwrap() ^= 1;
+    for bytes in [[&whole[..], b"x"].concat(), changed, whole[..whole.len() - 1].to_vec()] {
+        std::fs::write(&path, &bytes).unwrap();
+        refused(dir, "study --plan study/plan.json --out x", 3, "study/plan.json");
+        ran(dir, &again);
+        assert!(std::fs::read(&path).unwrap() == whole);
     }
+    // What stands before the records names the run: another one's plan is never written over.
+    std::fs::write(&path, &whole[..1000]).unwrap();
+    refused(dir, &again, 3, "this folder holds the plan of another run");
     // A shard that was given a plan leaves a whole one, too.
-    done(dir, &[&STUDY[..], &["--plan-only", "--out", "given"]].concat());
-    let whole = std::fs::read(dir.join("given/plan.json")).unwrap();
-    std::fs::write(dir.join("study/plan.json"), &whole[..whole.len() - 1]).unwrap();
-    done(dir, &["-q", "study", "--plan", "given/plan.json", "--shard", "0/9", "--out", "study", "--backend", "cpu"]);
-    assert!(std::fs::read(dir.join("study/plan.json")).unwrap() == whole);
+    ran(dir, &format!("{STUDY} --plan-only --out given"));
+    std::fs::write(&path, &whole[..whole.len() - 1]).unwrap();
+    ran(dir, "-q study --plan given/plan.json --shard 0/9 --out study --backend cpu");
+    assert!(std::fs::read(&path).unwrap() == whole);
 }
 
 /// 8,000 scenarios had 22 kB each in a plan: 600 MB to write it, 450 MB to read it.
@@ -263,24 +161,19 @@ fn a_damaged_plan_is_whole_again_after_the_command_that_its_message_names() {
 fn a_plan_of_many_scenarios_takes_little_memory() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/paper_sumo_01_02_scenarios.jsonl");
-    let rows: Vec<serde_json::Value> = std::fs::read_to_string(golden)
-        .unwrap()
-        .lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .filter(|row: &serde_json::Value| row["kept"] == true)
-        .collect();
-    let mut text = String::new();
-    for number in 0..8000 {
-        let mut row = rows[number % rows.len()].clone();
+    let golden = std::fs::read_to_string(crate::common::golden("paper_sumo_01_02_scenarios.jsonl")).unwrap();
+    let rows: Vec<serde_json::Value> = golden.lines().map(|line| line.parse().unwrap()).collect();
+    let line = |(number, row): (i32, &serde_json::Value)| {
+        let mut row = row.clone();
         row["id"] = format!("{}~{number}", row["id"].as_str().unwrap()).into();
-        text += &format!("{row}\n");
-    }
-    std::fs::write(dir.join("many.jsonl"), text).unwrap();
+        format!("{row}\n")
+    };
+    let many = (0..8000).zip(rows.iter().filter(|row| row["kept"] == true).cycle()).map(line);
+    std::fs::write(dir.join("many.jsonl"), many.collect::<String>()).unwrap();
     // Addresses, not memory that is in use: the limit that a shell can set.
     for args in ["--scenarios many.jsonl --plan-only", "--plan p/plan.json --shard 7/400"] {
         let study = format!("-q --threads 1 study --backend cpu --out p {args}");
-        let (code, _, err) = limited(dir, "ulimit -v 400000", &study.split(' ').collect::<Vec<_>>());
+        let (code, _, err) = limited(dir, "ulimit -v 400000", &words(&study));
         assert_eq!(code, 0, "{args}: {err}");
     }
     let bytes = std::fs::metadata(dir.join("p/plan.json")).unwrap().len();
@@ -292,24 +185,12 @@ fn an_interrupted_run_continues_and_ends_as_if_undisturbed() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     density(dir);
-    let long = [
-        "-q",
-        "sample",
-        "densities/cut-in-2.json",
-        "--backend",
-        "cpu",
-        "--samples",
-        "1000000",
-        "--thw",
-        "0.6",
-        "--threads",
-        "1",
-    ];
-    done(dir, &[&long[..], &["--out", "whole"]].concat());
-    for out in [&["--out", "run"][..], &["--out", "parts", "--shard", "0/1"]] {
+    let long = "-q sample densities/cut-in-2.json --backend cpu --samples 1000000 --thw 0.6 --threads 1 --out";
+    ran(dir, &format!("{long} whole"));
+    for out in ["run", "parts --shard 0/1"] {
         let mut interruptions = 0;
         loop {
-            let (code, _, err) = lanesweep(dir, &[&long[..], &["--config", "run.stop_after_s=0.3"], out].concat());
+            let (code, _, err) = lanesweep(dir, &words(&format!("{long} {out} --config run.stop_after_s=0.3")));
             match code {
                 0 => break,
                 75 => assert!(flat(&err).contains("are done and kept") && err.contains("it continues"), "{err}"),
@@ -320,44 +201,28 @@ fn an_interrupted_run_continues_and_ends_as_if_undisturbed() {
         }
         assert!(interruptions > 0, "the run is too short to be interrupted");
     }
-    done(dir, &["-q", "merge", "parts"]);
+    ran(dir, "-q merge parts");
     same(&dir.join("whole"), &dir.join("run"));
     same(&dir.join("whole"), &dir.join("parts"));
 }
 
 #[test]
-fn two_processes_do_not_compute_the_same_part() {
+fn parts_share_a_folder_and_keep_whole_runs_merges_and_themselves_out() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     density(dir);
-    let long =
-        ["-q", "sample", "densities/cut-in-2.json", "--backend", "cpu", "--samples", "100000000", "--out", "run"];
-    let mut first = start(dir, &long);
-    let lock = dir.join("run/run.lock");
+    let run = "-q sample densities/cut-in-2.json --backend cpu --samples 100000000 --out run";
+    let mut first = start(dir, &words(&format!("{run} --shard 0/2")));
+    let lock = dir.join("run/part-00000-of-00002.lock");
     wait_for_run(&mut first, "the lock is taken", || std::fs::read(&lock).is_ok_and(|pid| !pid.is_empty()));
-    let (code, out, err) = lanesweep(dir, &long);
+    let same_part = format!("{run} --shard 0/2");
+    let others = [run, "-q merge run", &same_part].map(|line| lanesweep(dir, &words(line)));
+    let beside = lanesweep(dir, &words(&format!("{run} --shard 1/2 --config run.stop_after_s=0.3")));
     let message = format!("another lanesweep process is writing this part or run (pid {})", first.id());
     kill(first);
-    assert_eq!(code, 75, "{err}");
-    assert!(flat(&err).contains(&message) && out.is_empty(), "{err}");
-}
-
-#[test]
-fn parts_share_a_folder_and_keep_whole_runs_and_merges_out() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    density(dir);
-    let run = ["-q", "sample", "densities/cut-in-2.json", "--backend", "cpu", "--samples", "100000000", "--out", "run"];
-    let shard = |index: &'static str| [&run[..], &["--shard", index]].concat();
-    let mut first = start(dir, &shard("0/2"));
-    wait_for_run(&mut first, "the lock is taken", || dir.join("run/part-00000-of-00002.lock").exists());
-    let others = [&run[..], &["-q", "merge", "run"], &shard("0/2")].map(|args| lanesweep(dir, args));
-    let beside = lanesweep(dir, &[&shard("1/2")[..], &["--config", "run.stop_after_s=0.3"]].concat());
-    kill(first);
-    for (code, _, err) in others {
-        assert_eq!(code, 75, "{err}");
-        assert!(flat(&err).contains("another lanesweep process"), "{err}");
+    for (code, out, err) in &others {
+        assert!(*code == 75 && out.is_empty() && flat(err).contains("another lanesweep process"), "{code}: {err}");
     }
-    assert_eq!(beside.0, 75, "{}", beside.2);
-    assert!(flat(&beside.2).contains("are done and kept"), "{}", beside.2);
+    assert!(unbroken(others[2].2.as_bytes()).contains(&message), "{}", others[2].2);
+    assert!(beside.0 == 75 && flat(&beside.2).contains("are done and kept"), "{}", beside.2);
 }

@@ -2,52 +2,24 @@
 
 use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
-use std::sync::OnceLock;
 
-use crate::common::program::{flat, lanesweep};
+use crate::common::mined::{fitted, scenarios};
+use crate::common::plans::mixed;
+use crate::common::program::{json, lanesweep, ran, refused, words};
 use lanesweep::Place;
-use lanesweep::engine::{Backend, CpuBackend, Headway, LanePlan, LaneRunner, Outcome, Wanted, words};
+use lanesweep::engine::{Backend, CpuBackend, Headway, LanePlan, LaneRunner, Outcome, Wanted, words as bits};
 use lanesweep::model::driver::MODELS;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::read_sealed_line;
 use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, plan_samples};
 use lanesweep::run::study::{StudyHead, StudyOptions, plan_study};
-use lanesweep::scenario::DataProvenance;
-use lanesweep::scenario::parameterization::Parameterization;
-use lanesweep::scenario::{Category, Scenario};
-use lanesweep::stats::density::{DensityModel, FitOptions};
-use lanesweep::traffic::mining::{MiningOptions, mine_generated};
-use lanesweep::traffic::trajectory::generator::GeneratorOptions;
+use lanesweep::scenario::Category;
 
 type Row = HashMap<String, String>;
 
-fn done(dir: &Path, args: &[&str]) -> (String, String) {
-    let (code, out, err) = lanesweep(dir, args);
-    assert_eq!(code, 0, "{args:?}: {err}");
-    (out, err)
-}
-
-fn refused(dir: &Path, args: &[&str], code: i32, said: &str) {
-    let (found, out, err) = lanesweep(dir, args);
-    let err = flat(&err);
-    assert!(found == code && out.is_empty() && err.contains(said), "{args:?} gave {found}: {err}");
-}
-
-/// A well-mixed number below `below` (SplitMix64).
+/// A number below `below`.
 fn drawn(index: u64, below: u64) -> u64 {
-    let mut z = (157 + index).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    (z ^ (z >> 31)) % below
-}
-
-/// The scenarios of the default study.
-fn scenarios() -> &'static [Scenario] {
-    static MINED: OnceLock<Vec<Scenario>> = OnceLock::new();
-    MINED.get_or_init(|| {
-        let generator = GeneratorOptions { recordings: 24, ..GeneratorOptions::default() };
-        mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap().scenarios
-    })
+    mixed(157, index) % below
 }
 
 /// The plan that a study left in its folder, read as a process does that recomputes nothing.
@@ -72,10 +44,10 @@ fn key_of(row: &Row) -> String {
 /// Reruns a lane by the program and compares with the study's row, every field.
 fn compare_with_row(dir: &Path, from: &str, row: &Row, wide: bool) {
     let key = key_of(row);
-    let (series, summary) = done(dir, &["simulate", "--from", from, "--lane", &key]);
+    let simulate = format!("simulate --from {from} --lane {key}");
+    let (_, series, summary) = lanesweep(dir, &words(&simulate));
     // The summary is for people; the document has every digit.
-    let (document, _) = done(dir, &["simulate", "--from", from, "--lane", &key, "--format", "json"]);
-    let document: serde_json::Value = serde_json::from_str(&document).unwrap();
+    let document: serde_json::Value = ran(dir, &format!("{simulate} --format json")).parse().unwrap();
     let outcome = &document["lanes"][0]["outcome"];
     let word = |name: &str| match &outcome[name] {
         serde_json::Value::String(text) if text == "Infinity" => f64::INFINITY.to_string(),
@@ -118,7 +90,7 @@ fn compare_with_row(dir: &Path, from: &str, row: &Row, wide: bool) {
 fn a_thousand_random_lanes_of_the_default_study_are_the_studys_lanes() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    done(dir, &["-q", "study", "--synth-recordings", "24", "--backend", "cpu", "--out", "result"]);
+    ran(dir, "-q study --synth-recordings 24 --backend cpu --out result");
     // The study itself, as it sweeps: in batches, on the widest instructions.
     let study = plan_study(scenarios(), &Profile::load("paper").unwrap(), &StudyOptions::default()).unwrap();
     let mut session = CpuBackend::lane_arithmetic().prepare(&study).unwrap();
@@ -127,9 +99,7 @@ fn a_thousand_random_lanes_of_the_default_study_are_the_studys_lanes() {
     // The reruns: from the folder.
     let plan = left_plan(&dir.join("result/run-plan.json"));
     assert_eq!(plan.hash(), study.hash());
-    let record: serde_json::Value =
-        serde_json::from_slice(&std::fs::read(dir.join("result/run.json")).unwrap()).unwrap();
-    assert_eq!(record["plan_sha256"], plan.hash());
+    assert_eq!(json(&dir.join("result/run.json"))["plan_sha256"], plan.hash());
     let runner = LaneRunner::<f32>::new(&plan);
     let mut seen = BTreeSet::new();
     for index in 0..1000 {
@@ -137,7 +107,7 @@ fn a_thousand_random_lanes_of_the_default_study_are_the_studys_lanes() {
         let text = study.key_text(&study.key(lane).unwrap());
         let key = plan.parse_key(&text).unwrap();
         let trace = runner.trace(&key);
-        assert_eq!(words(&trace.outcome), words(&outcomes[lane as usize]), "{text}");
+        assert_eq!(bits(&trace.outcome), bits(&outcomes[lane as usize]), "{text}");
         assert_eq!(trace.steps.len() as u64, u64::from(trace.outcome.end_step) + 1, "{text}");
         seen.insert(format!("category {}", key.block));
         seen.insert(format!("variant {} {}", key.block, key.variant));
@@ -148,38 +118,31 @@ fn a_thousand_random_lanes_of_the_default_study_are_the_studys_lanes() {
     assert_eq!(seen.len(), plan.blocks.len() + variants + plan.headways.len() + plan.models.len(), "{seen:?}");
 }
 
+/// The table of a study of two recordings.
+fn study(dir: &Path, more: &str) -> Vec<Row> {
+    ran(dir, &format!("-q study --synth-recordings 2 --rows lanes.csv {more}"));
+    rows(&dir.join("lanes.csv"))
+}
+
 #[test]
 fn lanes_run_again_by_the_program_are_the_rows_of_the_studys_table() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    let study = ["-q", "study", "--synth-recordings", "2", "--backend", "cpu", "--out", "r", "--rows", "lanes.csv"];
-    done(dir, &study);
-    let table = rows(&dir.join("lanes.csv"));
+    let table = study(dir, "--backend cpu --out r");
     for index in 1000..1012 {
         compare_with_row(dir, "r", &table[drawn(index, table.len() as u64) as usize], false);
     }
-    let crash = table.iter().find(|row| row["crash_type"] != "0").unwrap();
-    compare_with_row(dir, "r", crash, false);
+    compare_with_row(dir, "r", table.iter().find(|row| row["crash_type"] != "0").unwrap(), false);
 }
 
 #[test]
 fn sampled_lanes_are_the_runs_lanes_too() {
     let profile = Profile::load("paper").unwrap();
-    let facts =
-        DataProvenance { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
-    let options = FitOptions { valid_draws: 1000, ..FitOptions::default() };
     let mut lanes = 0;
     for (category, key) in [(Category::CutIn, "2"), (Category::CutOut, "b"), (Category::Lvd, "iv")] {
-        let id = Parameterization::find(category, key).unwrap();
-        let density = DensityModel::fit(id, scenarios(), &facts, &options).unwrap().model;
-        let options = SampleOptions {
-            seed: 3,
-            ..SampleOptions::new(
-                Estimator::CRUDE,
-                5000,
-                SampleHeadways::Each(vec![Headway::ThwS(1.4), Headway::ThwS(0.4)]),
-            )
-        };
+        let density = fitted(scenarios(), category, key, false);
+        let headways = SampleHeadways::Each(vec![Headway::ThwS(1.4), Headway::ThwS(0.4)]);
+        let options = SampleOptions { seed: 3, ..SampleOptions::new(Estimator::CRUDE, 5000, headways) };
         let plan = plan_samples(&density, &profile, &options).unwrap();
         let outcomes = CpuBackend::lane_arithmetic().prepare(&plan).unwrap();
         let outcomes = { outcomes }.run(0..plan.unit_count(), Wanted::Outcomes).unwrap().outcomes;
@@ -190,7 +153,7 @@ fn sampled_lanes_are_the_runs_lanes_too() {
             if plan.generator().unwrap().draw(key.unit).is_void() {
                 continue;
             }
-            assert_eq!(words(&runner.trace(&key).outcome), words(&outcomes[lane as usize]), "{}", plan.key_text(&key));
+            assert_eq!(bits(&runner.trace(&key).outcome), bits(&outcomes[lane as usize]), "{}", plan.key_text(&key));
             lanes += 1;
         }
     }
@@ -202,12 +165,9 @@ fn a_rerun_takes_profile_time_step_options_and_arithmetic_from_the_run() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     std::fs::write(dir.join("study.toml"), "[parameterization]\nafter_duration = \"unlimited\"\n").unwrap();
-    let base =
-        ["-q", "study", "--synth-recordings", "2", "--config", "study.toml", "--profile", "un-r157", "--dt", "0.1"];
-    for (out, flags) in [("narrow", &["--backend", "cpu"][..]), ("wide", &["--config", "study.reference=true"])] {
-        let lanes = format!("{out}.csv");
-        done(dir, &[&base[..], flags, &["--out", out, "--rows", &lanes]].concat());
-        let table = rows(&dir.join(&lanes));
+    let base = "--config study.toml --profile un-r157 --dt 0.1 --out";
+    for (out, flags) in [("narrow", "--backend cpu"), ("wide", "--config study.reference=true")] {
+        let table = study(dir, &format!("{base} {out} {flags}"));
         for index in 0..6 {
             compare_with_row(dir, out, &table[drawn(index, table.len() as u64) as usize], out == "wide");
         }
@@ -218,91 +178,85 @@ fn a_rerun_takes_profile_time_step_options_and_arithmetic_from_the_run() {
 fn a_lane_of_a_run_in_parts_can_be_looked_at_before_and_after_the_merge() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    let study = ["-q", "study", "--synth-recordings", "2", "--backend", "cpu"];
-    done(dir, &[&study[..], &["--out", "whole", "--rows", "lanes.csv"]].concat());
-    done(dir, &[&study[..], &["--out", "parts", "--shard", "0/2"]].concat());
-    let table = rows(&dir.join("lanes.csv"));
+    let table = study(dir, "--backend cpu --out whole");
+    let parts = "-q study --synth-recordings 2 --backend cpu --out parts --shard";
+    let trace = |from: &str, lane: &str| lanesweep(dir, &words(&format!("simulate --from {from} --lane {lane}")));
     let key = key_of(&table[table.len() / 2]);
-    let trace = |from: &str| done(dir, &["simulate", "--from", from, "--lane", &key]);
-    let of_whole = trace("whole");
-    assert_eq!(trace("parts"), of_whole);
-    done(dir, &[&study[..], &["--out", "parts", "--shard", "1/2"]].concat());
-    done(dir, &["-q", "merge", "parts"]);
-    assert_eq!(trace("parts"), of_whole);
+    let of_whole = trace("whole", &key);
+    assert_eq!(of_whole.0, 0, "{}", of_whole.2);
+    ran(dir, &format!("{parts} 0/2"));
+    assert_eq!(trace("parts", &key), of_whole);
+    ran(dir, &format!("{parts} 1/2"));
+    ran(dir, "-q merge parts");
+    assert_eq!(trace("parts", &key), of_whole);
     // A sampling run's parts as well.
-    let fit = ["-q", "fit", "--synth-recordings", "3", "--categories", "cut-in", "--parameterizations", "2"];
-    done(dir, &[&fit[..], &["--out", "densities"]].concat());
-    let sample = ["-q", "sample", "densities/cut-in-2.json", "--samples", "3000", "--thw", "0.6", "--backend", "cpu"];
-    done(dir, &[&sample[..], &["--out", "sampled"]].concat());
-    done(dir, &[&sample[..], &["--out", "shard", "--shard", "1/2"]].concat());
-    let trace = |from: &str| done(dir, &["simulate", "--from", from, "--lane", "#77/2/0.6s/FSM", "--models", "all"]);
-    assert_eq!(trace("shard"), trace("sampled"));
+    ran(dir, "-q fit --synth-recordings 3 --categories cut-in --parameterizations 2 --out densities");
+    let sample = "-q sample densities/cut-in-2.json --samples 3000 --thw 0.6 --backend cpu --out";
+    ran(dir, &format!("{sample} sampled"));
+    ran(dir, &format!("{sample} shard --shard 1/2"));
+    let of_whole = trace("sampled", "#77/2/0.6s/FSM --models all");
+    assert!(of_whole.0 == 0 && trace("shard", "#77/2/0.6s/FSM --models all") == of_whole, "{}", of_whole.2);
 }
 
 #[test]
 fn models_and_variants_stand_together_in_the_table_and_on_the_sheet() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    done(dir, &["-q", "study", "--synth-recordings", "2", "--backend", "cpu", "--out", "r", "--rows", "lanes.csv"]);
-    let table = rows(&dir.join("lanes.csv"));
+    let table = study(dir, "--backend cpu --out r");
     let row = table.iter().find(|row| row["category"] == "cut_in" && row["param"] == "2").unwrap();
-    let key = key_of(row);
-    let of_lane = |flags: &[&str]| done(dir, &[&["simulate", "--from", "r", "--lane", &key][..], flags].concat()).0;
+    let simulate = format!("simulate --from r --lane {}", key_of(row));
+    let of_lane = |flags: &str| ran(dir, &format!("{simulate} {flags}"));
     let lanes = |table: &str| {
-        let mut lanes: Vec<String> = Vec::new();
-        for line in table.lines().skip(1) {
-            let lane = line.split(',').next().unwrap();
-            if lanes.last().is_none_or(|last| last != lane) {
-                lanes.push(lane.to_owned());
-            }
-        }
+        let mut lanes: Vec<String> = table.lines().skip(1).map(|line| line.split(',').next().unwrap().into()).collect();
+        lanes.dedup();
         lanes
     };
-    let alone = of_lane(&["--plot", "one.svg"]);
-    let compared = of_lane(&["--compare", "--plot", "two.svg"]);
+    let alone = of_lane("--plot one.svg");
+    let compared = of_lane("--compare --plot two.svg");
     let [recorded, own] = &lanes(&compared)[..] else { panic!("two lanes") };
     assert!(recorded.contains("/S/") && own.contains("/2/"), "S first: {recorded}, {own}");
     // The rows of the lane itself are those that it has alone.
     let rows_of_own: Vec<&str> = compared.lines().filter_map(|line| line.strip_prefix(&format!("{own},"))).collect();
     assert_eq!(rows_of_own, alone.lines().skip(1).collect::<Vec<_>>());
-    assert_eq!(lanes(&of_lane(&["--models", "all", "--plot", "figures/all.svg"])).len(), MODELS);
-    assert_eq!(lanes(&of_lane(&["--models", "RSS,FSM", "--compare", "S,1"])).len(), 6);
+    assert_eq!(lanes(&of_lane("--models all --plot figures/all.svg")).len(), MODELS);
+    assert_eq!(lanes(&of_lane("--models RSS,FSM --compare S,1")).len(), 6);
     for (figure, names) in [("one.svg", 1), ("two.svg", 2), ("figures/all.svg", MODELS)] {
         let svg = std::fs::read_to_string(dir.join(figure)).unwrap();
         assert!(svg.contains("SYNTHETIC DATA"), "{figure} says what its data are");
         assert_eq!(svg.matches("class=\"legend\"").count(), names, "{figure}");
     }
-    refused(dir, &["simulate", "--from", "r", "--lane", &key, "--compare", "2"], 2, "this is the lane itself");
-    refused(dir, &["simulate", "--from", "r", "--lane", &key, "--compare", "zz"], 2, "use S, 1, 2");
-    refused(dir, &["simulate", "--from", "r", "--lane", "nobody/S/1s/FSM"], 2, "for instance");
-    refused(dir, &["simulate", "--from", "r", "--lane", &key, "--plot", "one.png"], 2, "ends in .svg");
-    refused(dir, &["simulate", "--from", "r", "--lane", &key, "--plot", "r/radar-lvd.svg"], 2, "a result of the run");
+    for (flags, hint) in [
+        ("--compare 2", "this is the lane itself"),
+        ("--compare zz", "use S, 1, 2"),
+        ("--plot one.png", "ends in .svg"),
+        ("--plot r/radar-lvd.svg", "a result of the run"),
+    ] {
+        refused(dir, &format!("{simulate} {flags}"), 2, hint);
+    }
+    refused(dir, "simulate --from r --lane nobody/S/1s/FSM", 2, "for instance");
 }
 
 #[test]
 fn a_folder_without_its_plan_says_how_to_make_it() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    let study = ["-q", "study", "--synth-recordings", "2", "--backend", "cpu"];
-    done(dir, &[&study[..], &["--out", "r", "--config", "study.keep_plan=never", "--rows", "lanes.csv"]].concat());
+    let table = study(dir, "--backend cpu --out r --config study.keep_plan=never");
     assert!(!dir.join("r/run-plan.json").exists());
-    let key = key_of(&rows(&dir.join("lanes.csv"))[0]);
-    let rerun = ["simulate", "--from", "r", "--lane", &key];
+    let rerun = format!("simulate --from r --lane {}", key_of(&table[0]));
     refused(dir, &rerun, 3, "there is no plan of its lanes beside it");
-    refused(dir, &["simulate", "--from", ".", "--lane", &key], 3, "there is no run here");
-    // Another study's plan is not taken for it; its own, made later, is.
-    let only = |dt: &str| done(dir, &[&study[..], &["--dt", dt, "--plan-only", "--out", &format!("p{dt}")]].concat());
-    only("0.08");
-    std::fs::copy(dir.join("p0.08/plan.json"), dir.join("r/plan.json")).unwrap();
+    refused(dir, &rerun.replace("from r", "from ."), 3, "there is no run here");
+    // Another study's plan is not taken for it; its own, made later, is; a damaged one is refused.
+    let plan = |dt: &str| {
+        ran(dir, &format!("-q study --synth-recordings 2 --backend cpu --dt {dt} --plan-only --out p{dt}"));
+        std::fs::read(dir.join(format!("p{dt}/plan.json"))).unwrap()
+    };
+    std::fs::write(dir.join("r/plan.json"), plan("0.08")).unwrap();
     refused(dir, &rerun, 3, "is not the plan that it records");
-    only("0.04");
-    std::fs::copy(dir.join("p0.04/plan.json"), dir.join("r/plan.json")).unwrap();
-    done(dir, &rerun);
-    // A damaged plan is refused.
-    let mut text = std::fs::read(dir.join("r/plan.json")).unwrap();
-    let at = text.len() / 2;
-    text[at] ^= 1;
-    std::fs::write(dir.join("r/plan.json"), text).unwrap();
-    let (code, _, err) = lanesweep(dir, &rerun);
-    assert_eq!(code, 3, "{err}");
+    let mut own = plan("0.04");
+    std::fs::write(dir.join("r/plan.json"), &own).unwrap();
+    ran(dir, &rerun);
+    let middle = own.len() / 2;
+    own[middle] ^= 1;
+    std::fs::write(dir.join("r/plan.json"), own).unwrap();
+    refused(dir, &rerun, 3, "plan.json");
 }

@@ -1,44 +1,28 @@
 //! Sampling runs: the same counts and the same failing lanes however a run is cut up, and what the command line makes
 //! of good and bad input.
 
-use crate::common;
+use crate::common::mined::{fitted, scenarios};
+use crate::common::program::{json, ran, refused};
+use crate::common::{self, program};
 
-use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::path::Path;
 
-use crate::common::program::lanesweep;
 use lanesweep::engine::{Backend, CpuBackend, Headway, LanePlan, SampleTally, Wanted};
 use lanesweep::model::driver::MODELS;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, plan_samples};
-use lanesweep::scenario::DataProvenance;
-use lanesweep::scenario::parameterization::Parameterization;
-use lanesweep::scenario::{Category, Scenario};
-use lanesweep::stats::density::{DensityModel, FitOptions, Kde, read_density, write_density};
-use lanesweep::traffic::mining::{MiningOptions, mine_generated};
-use lanesweep::traffic::trajectory::generator::GeneratorOptions;
-
-fn scenarios() -> &'static [Scenario] {
-    static MINED: OnceLock<Vec<Scenario>> = OnceLock::new();
-    MINED.get_or_init(|| {
-        let generator = GeneratorOptions { recordings: 24, ..GeneratorOptions::default() };
-        mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap().scenarios
-    })
-}
+use lanesweep::scenario::Category;
+use lanesweep::stats::density::{DensityModel, Kde, read_density, write_density};
 
 fn density(category: Category, key: &str) -> DensityModel {
-    let facts =
-        DataProvenance { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
-    let options = FitOptions { valid_draws: 1000, ..FitOptions::default() };
-    DensityModel::fit(Parameterization::find(category, key).unwrap(), scenarios(), &facts, &options).unwrap().model
+    fitted(scenarios(), category, key, false)
 }
 
 /// A folder with a density file in it.
-fn folder() -> (tempfile::TempDir, PathBuf) {
+fn folder() -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("density.json");
-    write_density(&path, &density(Category::CutIn, "2")).unwrap();
-    (dir, path)
+    write_density(&dir.path().join("density.json"), &density(Category::CutIn, "2")).unwrap();
+    dir
 }
 
 fn options_of(samples: u64) -> SampleOptions {
@@ -129,32 +113,22 @@ fn first_failing(table: &str, limit: usize) -> String {
 
 #[test]
 fn a_run_in_parts_is_the_run_in_one_and_its_failing_lanes_are_the_first_of_all_rows() {
-    let (dir, _) = folder();
-    let run = |args: &[&str]| {
-        let (code, out, err) = lanesweep(dir.path(), &[&["-q"], args].concat());
-        assert_eq!(code, 0, "{args:?}: {err}");
-        out
-    };
-    let base = ["sample", "density.json", "--samples", "20000", "--thw", "0.6,0.3", "--seed", "9", "--backend", "cpu"];
-    run(&[&base[..], &["--out", "whole", "--rows", "rows.csv", "--failures", "first.csv"]].concat());
-    for shard in ["1/2", "0/2"] {
-        run(&[&base[..], &["--out", "joined", "--shard", shard]].concat());
-    }
-    run(&["merge", "joined", "--failures", "joined.csv"]);
-    let few = ["--config", "sample.failures_limit=7"];
-    run(&[&["merge", "joined", "--failures", "seven.csv"], &few[..]].concat());
+    let dir = folder();
+    let dir = dir.path();
+    let base = "-q sample density.json --samples 20000 --thw 0.6,0.3 --seed 9 --backend cpu";
+    let whole = ran(dir, &format!("{base} --out whole --rows rows.csv --failures first.csv"));
+    let _ = ["1/2", "0/2"].map(|shard| ran(dir, &format!("{base} --out joined --shard {shard}")));
+    assert_eq!(ran(dir, "-q merge joined --failures joined.csv"), whole);
+    ran(dir, "-q merge joined --failures seven.csv --config sample.failures_limit=7");
     if common::device::software_backend().is_some() {
-        let mut counted = [&base[..], &["--failures", "counted.csv", "--out", "counted"], &few[..]].concat();
-        let at = counted.iter().position(|word| *word == "cpu").unwrap();
-        counted.splice(at..=at, ["gpu", "--device", "llvmpipe"]);
-        run(&counted);
+        let counted = base.replace("cpu", "gpu --device llvmpipe");
+        ran(dir, &format!("{counted} --failures counted.csv --out counted --config sample.failures_limit=7"));
     } else {
-        std::fs::copy(dir.path().join("seven.csv"), dir.path().join("counted.csv")).unwrap();
+        std::fs::copy(dir.join("seven.csv"), dir.join("counted.csv")).unwrap();
     }
-    let read = |path: &str| std::fs::read_to_string(dir.path().join(path)).unwrap();
-    for file in ["estimates.csv", "density.json", "convergence.csv", "convergence.svg"] {
-        assert!(read(&format!("whole/{file}")) == read(&format!("joined/{file}")), "{file}");
-    }
+    super::parts::same(&dir.join("whole"), &dir.join("joined"));
+    assert!(dir.join("joined/convergence.svg").exists());
+    let read = |path: &str| std::fs::read_to_string(dir.join(path)).unwrap();
     let rows = read("rows.csv");
     assert_eq!(rows.lines().count(), 1 + 20_000 * 2 * MODELS);
     let (all, seven) = (first_failing(&rows, 1000), first_failing(&rows, 7));
@@ -162,57 +136,28 @@ fn a_run_in_parts_is_the_run_in_one_and_its_failing_lanes_are_the_first_of_all_r
     assert!(read("first.csv") == all && read("joined.csv") == all, "the first thousand");
     assert!(read("seven.csv") == seven && read("counted.csv") == seven, "the first seven");
     // A row says how to run its lane again, and it is the same lane.
-    for row in rows_of(&dir.path().join("seven.csv")).iter().step_by(9) {
+    for row in rows_of(&dir.join("seven.csv")).iter().step_by(9) {
         let key = format!("#{}/{}/{}/{}", row["sample"], row["parameterization"], row["headway"], row["model"]);
-        let (code, trace, summary) = lanesweep(dir.path(), &["simulate", "--from", "whole", "--lane", &key]);
-        assert_eq!(code, 0, "{summary}");
-        assert!(trace.starts_with("t_s,"));
+        let (code, trace, summary) = program::lanesweep(dir, &["simulate", "--from", "whole", "--lane", &key]);
+        assert!(code == 0 && trace.starts_with("t_s,"), "{summary}");
         for (name, column) in [("Collision", "collision"), ("TTC", "ttc"), ("BTN", "btn")] {
             let word = if row[column] == "1" { "FAIL" } else { "pass" };
             assert!(summary.contains(&format!("{name} {word}")), "{key}: {summary}");
         }
     }
-    let (code, _, err) = lanesweep(dir.path(), &[&base[..], &["--shard", "0/2", "--failures", "x.csv"]].concat());
-    assert!(code == 2 && err.contains("--failures"), "{err}");
-}
-
-#[test]
-fn failing_draws_of_a_proposal_are_the_same_in_shards() {
-    let (dir, _) = folder();
-    let base = ["-q", "sample", "density.json", "--thw", "0.6,0.3", "--models", "FSM,RSS", "--backend", "cpu"];
-    let is = ["--estimator", "is", "--samples", "5000", "--criterion", "ttc"];
-    let run = |args: &[&str]| {
-        let (code, _, err) = lanesweep(dir.path(), &[&base[..], &is, args].concat());
-        assert_eq!(code, 0, "{args:?}: {err}");
-    };
-    run(&["--out", "whole", "--failures", "whole.csv"]);
-    for shard in ["2/3", "0/3", "1/3"] {
-        run(&["--out", "parts", "--shard", shard]);
-    }
-    let (code, _, err) = lanesweep(dir.path(), &["-q", "merge", "parts", "--failures", "parts.csv"]);
-    assert_eq!(code, 0, "{err}");
-    let read = |path: &str| std::fs::read(dir.path().join(path)).unwrap();
-    assert!(read("whole.csv") == read("parts.csv"));
-    let rows = rows_of(&dir.path().join("whole.csv"));
-    for model in ["FSM", "RSS"] {
-        let of_model: Vec<&Row> = rows.iter().filter(|row| row["model"] == model).collect();
-        assert_eq!(of_model.len(), 1000, "{model}");
-        assert!(of_model.iter().all(|row| row["ttc"] == "1"), "{model}");
-    }
+    refused(dir, &format!("{base} --shard 0/2 --failures x.csv"), 2, "--failures");
 }
 
 #[test]
 fn rows_hold_every_lane_of_a_reduced_density_with_its_point() {
     let dir = tempfile::tempdir().unwrap();
     write_density(&dir.path().join("d.json"), &density(Category::CutOut, "f")).unwrap();
-    let args = ["-q", "sample", "d.json", "--samples", "200", "--thw", "0.6", "--rows", "rows.csv", "--backend", "cpu"];
-    let (code, _, err) = lanesweep(dir.path(), &args);
-    assert_eq!(code, 0, "{err}");
+    ran(dir.path(), "-q sample d.json --samples 200 --thw 0.6 --rows rows.csv --backend cpu");
     let rows = rows_of(&dir.path().join("rows.csv"));
     assert_eq!(rows.len(), 200 * MODELS);
     assert!(rows.iter().all(|row| row["c5"].parse::<f32>().is_ok() && row["headway"] == "0.6s"));
     let failed = rows.iter().filter(|row| row["collision"] == "1" && row["model"] == "FSM").count();
-    let table = std::fs::read_to_string(dir.path().join("lanesweep-sample/estimates.csv")).unwrap();
+    let table = estimates(dir.path(), "lanesweep-sample");
     let row = table.lines().find(|line| line.contains("mc,FSM,collision,0.6s")).unwrap();
     assert_eq!(row.split(',').nth(7).unwrap(), failed.to_string());
 }
@@ -222,36 +167,30 @@ fn estimates(dir: &Path, folder: &str) -> String {
 }
 
 #[test]
-fn a_searched_proposal_can_be_sampled_again_and_in_shards() {
-    let (dir, _) = folder();
-    let base = ["-q", "sample", "density.json", "--thw", "0.3", "--models", "FSM", "--backend", "cpu"];
-    let run = |args: &[&str]| {
-        let (code, _, err) = lanesweep(dir.path(), &[&base[..], args].concat());
-        assert_eq!(code, 0, "{args:?}: {err}");
-    };
+fn a_searched_proposal_can_be_sampled_again_and_in_shards_with_its_failing_draws() {
+    let dir = folder();
+    let dir = dir.path();
+    let base = "-q sample density.json --thw 0.3 --models FSM --backend cpu";
     let merged = |folder: &str| {
-        let (code, _, err) = lanesweep(dir.path(), &["-q", "merge", folder]);
-        assert_eq!(code, 0, "{err}");
-        estimates(dir.path(), folder)
+        ran(dir, &format!("-q merge {folder} --failures {folder}.csv"));
+        estimates(dir, folder)
     };
-    run(&["--samples", "60000", "--out", "mc"]);
-    run(&["--estimator", "is", "--out", "is"]);
+    ran(dir, &format!("{base} --samples 60000 --out mc"));
+    ran(dir, &format!("{base} --estimator is --out is --failures is.csv"));
     // Every shard finds the same proposal, or reads it in the plan of another.
-    for shard in ["2/3", "0/3", "1/3"] {
-        run(&["--estimator", "is", "--out", "searched", "--shard", shard]);
+    let searched = |shard| ran(dir, &format!("{base} --estimator is --out searched --shard {shard}"));
+    let _ = ["2/3", "0/3", "1/3"].map(searched);
+    assert_eq!(merged("searched"), estimates(dir, "is"));
+    let given = format!("{base} --estimator is --proposal is/proposal.json --samples 20000");
+    ran(dir, &format!("{given} --out again --failures again.csv"));
+    let _ = ["1/2", "0/2"].map(|shard| ran(dir, &format!("{given} --out given --shard {shard}")));
+    assert_eq!(merged("given"), estimates(dir, "again"));
+    for (whole, parts) in [("is.csv", "searched.csv"), ("again.csv", "given.csv")] {
+        let rows = rows_of(&dir.join(whole));
+        assert!(rows == rows_of(&dir.join(parts)), "{whole}");
+        assert!(rows.len() == 1000 && rows.iter().all(|row| row["collision"] == "1"), "{whole}: {}", rows.len());
     }
-    assert_eq!(merged("searched"), estimates(dir.path(), "is"));
-    let given = ["--estimator", "is", "--proposal", "is/proposal.json", "--samples", "20000"];
-    run(&[&given[..], &["--out", "again"]].concat());
-    for shard in ["1/2", "0/2"] {
-        run(&[&given[..], &["--out", "given", "--shard", shard]].concat());
-    }
-    assert_eq!(merged("given"), estimates(dir.path(), "again"));
-    let estimate = |folder: &str| -> serde_json::Value {
-        let text = std::fs::read(dir.path().join(folder).join("estimate.json")).unwrap();
-        let file: serde_json::Value = serde_json::from_slice(&text).unwrap();
-        file["estimates"][0]["estimate"].clone()
-    };
+    let estimate = |folder: &str| json(&dir.join(folder).join("estimate.json"))["estimates"][0]["estimate"].clone();
     let truth = estimate("mc")["probability"].as_f64().unwrap();
     for folder in ["is", "again"] {
         let found = estimate(folder);
@@ -264,10 +203,9 @@ fn a_searched_proposal_can_be_sampled_again_and_in_shards() {
 /// The half-width decides how a question is answered, and every question is answered.
 #[test]
 fn auto_answers_frequent_failures_by_crude_lanes_and_rare_ones_by_importance_sampling() {
-    let (dir, _) = folder();
-    let base = ["-q", "sample", "density.json", "--thw", "0.3,2.1", "--models", "FSM", "--backend", "cpu"];
-    let (code, text, err) = lanesweep(dir.path(), &[&base[..], &["--half-width", "0.2"]].concat());
-    assert_eq!(code, 0, "{err}");
+    let dir = folder();
+    let line = "-q sample density.json --thw 0.3,2.1 --models FSM --backend cpu --half-width 0.2";
+    let text = ran(dir.path(), line);
     assert!(text.contains("Rare failures, by importance sampling"), "{text}");
     let table = estimates(dir.path(), "lanesweep-sample");
     let mut estimators = Vec::new();
@@ -300,12 +238,9 @@ fn few_and_all() -> tempfile::TempDir {
 }
 
 /// The record of a run of Reg157, and what it printed.
-fn estimated(dir: &Path, density: &str, more: &[&str]) -> (serde_json::Value, String) {
-    let args = ["-q", "sample", density, "--models", "Reg157", "--backend", "cpu"];
-    let (code, text, err) = lanesweep(dir, &[&args[..], more].concat());
-    assert_eq!(code, 0, "{more:?}: {err}");
-    let file = std::fs::read(dir.join("lanesweep-sample/estimate.json")).unwrap();
-    (serde_json::from_slice(&file).unwrap(), text)
+fn estimated(dir: &Path, density: &str, more: &str) -> (serde_json::Value, String) {
+    let text = ran(dir, &format!("-q sample {density} --models Reg157 --backend cpu {more}"));
+    (json(&dir.join("lanesweep-sample/estimate.json")), text)
 }
 
 /// Ends of a row's interval.
@@ -317,9 +252,8 @@ fn interval(row: &serde_json::Value) -> [f64; 2] {
 fn few_scenarios_are_said_once_and_their_interval_is_that_of_other_data_too() {
     let dir = few_and_all();
     let ends = |value: &serde_json::Value| [0, 1].map(|end| value[end].as_f64().unwrap());
-    let how = ["--samples", "6000", "--thw", "1,0.4"];
     for (density, is_sound) in [("nine.json", false), ("all.json", true)] {
-        let (file, text) = estimated(dir.path(), density, &how);
+        let (file, text) = estimated(dir.path(), density, "--samples 6000 --thw 1,0.4");
         for row in (0..3).map(|at| &file["estimates"][3 * at]) {
             assert_eq!(row["headway"], "all");
             let ([low, high], draws) = (interval(row), ends(&row["draws"]));
@@ -339,74 +273,58 @@ fn few_scenarios_are_said_once_and_their_interval_is_that_of_other_data_too() {
 #[test]
 fn draws_of_a_proposal_tell_their_scenarios_by_the_kernels_that_explain_them() {
     let dir = few_and_all();
-    let crude = estimated(dir.path(), "all.json", &["--thw", "0.4", "--samples", "6000"]).0["estimates"][0].clone();
-    {
-        let how = ["--thw", "0.4", "--estimator", "is", "--samples", "12000"];
-        let (file, text) = estimated(dir.path(), "all.json", &how);
-        let rows = file["estimates"].as_array().unwrap();
-        let is_costlier =
-            rows.iter().any(|row| row["estimate"]["variance_reduction"].as_f64().is_some_and(|r| r < 1.0));
-        assert_eq!(text.contains("times the lanes that crude Monte Carlo"), is_costlier, "{text}");
-        let row = rows[0].clone();
-        let [a, b] = [&crude, &row].map(|row| row["failing_scenarios"].as_f64().unwrap());
-        assert!((0.6..1.7).contains(&(b / a)), "{b} failing scenarios beside {a}");
-        let width = |row| libm::log(interval(row)[1] / interval(row)[0]);
-        let ratio = width(&row) / width(&crude);
-        assert!((0.6..1.7).contains(&ratio), "{ratio}");
-        let few = estimated(dir.path(), "nine.json", &how).0["estimates"][0].clone();
-        assert!(few["estimate"]["trust"]["warnings"].to_string().contains("few_scenarios"), "{few}");
-    }
+    let crude = estimated(dir.path(), "all.json", "--thw 0.4 --samples 6000").0["estimates"][0].clone();
+    let how = "--thw 0.4 --estimator is --samples 12000";
+    let (file, text) = estimated(dir.path(), "all.json", how);
+    let rows = file["estimates"].as_array().unwrap();
+    let is_costlier = rows.iter().any(|row| row["estimate"]["variance_reduction"].as_f64().is_some_and(|r| r < 1.0));
+    assert_eq!(text.contains("times the lanes that crude Monte Carlo"), is_costlier, "{text}");
+    let [a, b] = [&crude, &rows[0]].map(|row| row["failing_scenarios"].as_f64().unwrap());
+    assert!((0.6..1.7).contains(&(b / a)), "{b} failing scenarios beside {a}");
+    let width = |row| libm::log(interval(row)[1] / interval(row)[0]);
+    let ratio = width(&rows[0]) / width(&crude);
+    assert!((0.6..1.7).contains(&ratio), "{ratio}");
+    let few = estimated(dir.path(), "nine.json", how).0["estimates"][0].clone();
+    assert!(few["estimate"]["trust"]["warnings"].to_string().contains("few_scenarios"), "{few}");
 }
 
 #[test]
 fn bad_input_is_told_with_its_place_and_what_to_do() {
-    let (dir, path) = folder();
-    let text = std::fs::read_to_string(&path).unwrap();
-    std::fs::write(dir.path().join("newer.json"), text.replace("\"lanesweep_density\": 2", "\"lanesweep_density\": 3"))
-        .unwrap();
-    std::fs::write(dir.path().join("cut.json"), &text[..text.len() / 2]).unwrap();
-    std::fs::write(dir.path().join("edited.json"), text.replacen("0.", "1.", 1)).unwrap();
-    let d = "density.json";
-    let cases: [(&[&str], i32, &str); 23] = [
-        (&[d, "--estimator", "is", "--samples", "300000000000000"], 2, "at least 1 and at most 281474976710655"),
-        (&[d, "--estimator", "is", "--time-limit", "3"], 2, "belongs to crude Monte Carlo"),
-        (&[d, "--samples", "0"], 2, "--samples: `0` cannot be used"),
-        (&[d, "--samples", "9223372036854775808"], 2, "more than can be counted"),
-        (&[d, "--samples", "2000000000000000000"], 2, "more than can be counted"),
-        (&[d, "--samples", "-1"], 2, "--samples"),
-        (&[d, "--models", "Reg158"], 2, "no driver model `Reg158`"),
-        (&[d, "--criterion", "crash"], 2, "possible values: collision, ttc, btn"),
-        (&[d, "--failures", "f.txt"], 2, "f.txt"),
-        (&[d, "--thw", "-1"], 2, "not a time headway"),
-        (&[d, "--thw", "sampled"], 2, "--with-thw"),
-        (&[d, "--estimator", "subset"], 2, "possible values: auto, mc, is"),
-        (&[d, "--shard", "5/5"], 2, "no shard 5 of 5"),
-        (&[d, "--shard", "0/2", "--half-width", "0.1"], 2, "cannot evaluate a stop rule"),
-        (&[d, "--plan", "plan.json"], 2, "cannot be used with"),
-        (&[d, "--level", "1"], 2, "above 0 and below 1"),
-        (&[d, "--config", "sample.points=sobol", "--samples", "5000000000"], 2, "4294967296"),
-        (&["absent.json"], 6, "absent.json"),
-        (&["newer.json"], 3, "version 2"),
-        (&["cut.json"], 3, "cut.json"),
-        (&["edited.json"], 3, "edited.json"),
-        (&[d, "--estimator", "is", "--thw", "1", "--proposal", d], 3, "no proposal"),
-        (&[], 2, "<DENSITY>"),
-    ];
-    for (args, code, said) in cases {
-        let (found, out, err) = lanesweep(dir.path(), &[&["sample"], args].concat());
-        assert_eq!(found, code, "{args:?}: {err}");
-        let flat = err.split_whitespace().collect::<Vec<_>>().join(" ");
-        assert!(flat.contains(said), "{args:?}: {err}");
-        assert!(out.is_empty() && !err.contains("panicked"), "{args:?}");
+    let dir = folder();
+    let dir = dir.path();
+    write_density(&dir.join("cut-out.json"), &density(Category::CutOut, "a")).unwrap();
+    let text = std::fs::read_to_string(dir.join("density.json")).unwrap();
+    let newer = text.replace("\"lanesweep_density\": 2", "\"lanesweep_density\": 3");
+    std::fs::write(dir.join("newer.json"), newer).unwrap();
+    std::fs::write(dir.join("cut.json"), &text[..text.len() / 2]).unwrap();
+    std::fs::write(dir.join("edited.json"), text.replacen("0.", "1.", 1)).unwrap();
+    for (args, code, said) in [
+        ("@ --estimator is --samples 300000000000000", 2, "at least 1 and at most 281474976710655"),
+        ("@ --estimator is --time-limit 3", 2, "belongs to crude Monte Carlo"),
+        ("@ --samples 0", 2, "--samples: `0` cannot be used"),
+        ("@ --samples 9223372036854775808", 2, "more than can be counted"),
+        ("@ --samples 2000000000000000000", 2, "more than can be counted"),
+        ("@ --samples -1", 2, "--samples"),
+        ("@ --models Reg158", 2, "no driver model `Reg158`"),
+        ("@ --criterion crash", 2, "possible values: collision, ttc, btn"),
+        ("@ --failures f.txt", 2, "f.txt"),
+        ("@ --thw -1", 2, "not a time headway"),
+        ("@ --thw sampled", 2, "--with-thw"),
+        ("@ --estimator subset", 2, "possible values: auto, mc, is"),
+        ("@ --shard 5/5", 2, "no shard 5 of 5"),
+        ("@ --shard 0/2 --half-width 0.1", 2, "cannot evaluate a stop rule"),
+        ("@ --plan plan.json", 2, "cannot be used with"),
+        ("@ --level 1", 2, "above 0 and below 1"),
+        ("@ --config sample.points=sobol --samples 5000000000", 2, "4294967296"),
+        ("absent.json", 6, "absent.json"),
+        ("newer.json", 3, "version 2"),
+        ("cut.json", 3, "cut.json"),
+        ("edited.json", 3, "edited.json"),
+        ("@ --estimator is --thw 1 --proposal @", 3, "no proposal"),
+        ("", 2, "<DENSITY>"),
+        ("cut-out.json --profile jrc-2021", 2, "exposure"),
+    ] {
+        refused(dir, &format!("sample {}", args.replace('@', "density.json")), code, said);
     }
-    assert!(read_density(&path).is_ok());
-}
-
-#[test]
-fn a_cut_out_that_begins_at_the_exposure_is_refused() {
-    let dir = tempfile::tempdir().unwrap();
-    write_density(&dir.path().join("cut-out.json"), &density(Category::CutOut, "a")).unwrap();
-    let (code, _, err) = lanesweep(dir.path(), &["sample", "cut-out.json", "--profile", "jrc-2021"]);
-    assert_eq!(code, 2, "{err}");
-    assert!(err.contains("exposure"), "{err}");
+    assert!(read_density(&dir.join("density.json")).is_ok());
 }

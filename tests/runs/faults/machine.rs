@@ -3,18 +3,18 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
-use super::{Bench, RUNS, SAMPLE, same, shared};
-use crate::common::program::{PROGRAM, done, unbroken};
+use super::{Bench, RUNS, SAMPLE, STUDY, same, shared};
+use crate::common::program::{self, PROGRAM, files, ran, unbroken, words};
 use crate::common::skipped;
 
 /// Runs a shell script with an empty disk of its own at `$DISK`; `None` where this machine allows no mounts.
-fn on_a_disk(bench: &Bench, size: &str, script: &str, args: &[&str]) -> Option<Output> {
+fn on_a_disk(bench: &Bench, size: &str, script: &str, line: &str) -> Option<Output> {
     let disk = bench.path().join("disk");
     std::fs::create_dir_all(&disk).unwrap();
     let mount = format!("mount -t tmpfs -o size={size} none \"$DISK\" || exit 99\n");
     let run = |namespace: &str, script: &str| {
         let mut command = Command::new("unshare");
-        command.args([namespace, "sh", "-c", script, PROGRAM]).args(args).current_dir(bench.path());
+        command.args([namespace, "sh", "-c", script, PROGRAM]).args(words(line)).current_dir(bench.path());
         command.env("DISK", &disk).env("NO_COLOR", "1").output().ok()
     };
     // As root, or as whoever may be root of a namespace of their own.
@@ -50,7 +50,7 @@ fn a_disk_that_fills_up_is_told_and_the_same_command_ends_well_once_there_is_spa
             assert_eq!(lines(&output), ["full 6", "0", "freed 0"], "{name}, {size}: {said}");
             assert!(said.contains("No space left") && said.contains("the disk is full"), "{name}, {size}: {said}");
             of_journals += u32::from(said.contains(".journal") && said.contains("goes on from them"));
-            same(&bench.path().join("copy"), &whole, &format!("{name}, {size}"));
+            same(&bench.path().join("copy"), &whole);
             std::fs::remove_dir_all(bench.path().join("copy")).unwrap();
         }
     }
@@ -58,56 +58,41 @@ fn a_disk_that_fills_up_is_told_and_the_same_command_ends_well_once_there_is_spa
 }
 
 #[test]
-fn recordings_that_do_not_fit_leave_no_folder_that_looks_whole() {
+fn recordings_and_scenarios_that_do_not_fit_leave_nothing_that_looks_whole() {
     let bench = Bench::new();
-    let synth: &[&str] = &["-q", "synth", "--synth-recordings", "2", "--config", "generator.duration_s=20"];
-    let convert: &[&str] = &["-q", "tracks", "synth", "--convert"];
-    for (name, run) in [("synth", synth), ("converted", convert)] {
-        done(bench.path(), &[run, &[name]].concat());
-        let size = |file: &str| std::fs::metadata(bench.path().join(name).join(file)).unwrap().len();
-        // The first fits, the second only to its half.
-        let size = format!("{}k", (size("01_tracks.csv") + size("02_tracks.csv") / 2) / 1024 + 32);
-        let script = "\
-            \"$0\" \"$@\" \"$DISK/out\" >/dev/null; echo full $?; ls -A \"$DISK/out\"\n\
+    let dir = bench.path();
+    let synth = "-q synth --synth-recordings 2 --config generator.duration_s=20";
+    ran(dir, &format!("{synth} whole/synth"));
+    ran(dir, "-q synth recordings --synth-recordings 6");
+    std::fs::create_dir_all(dir.join("whole/mine")).unwrap();
+    ran(dir, "-q mine recordings --out whole/mine/s.jsonl");
+    // The first recording fits, the second only to its half.
+    let size = |file: &str| std::fs::metadata(dir.join("whole/synth").join(file)).unwrap().len();
+    let half = format!("{}k", (size("01_tracks.csv") + size("02_tracks.csv") / 2) / 1024 + 32);
+    for (name, line, size, file, cut_off) in [
+        ("synth", synth, &*half, "", "02_tracks.csv"),
+        ("mine", "-q mine recordings --out", "8k", "/s.jsonl", "s.jsonl"),
+        ("mine", "-q mine recordings --out", "24k", "/s.jsonl", "s.jsonl"),
+    ] {
+        let script = format!(
+            "mkdir -p \"$DISK/out\"\n\
+            \"$0\" \"$@\" \"$DISK/out{file}\" >/dev/null; echo full $?; ls -A \"$DISK/out\"\n\
             mount -o remount,size=64m \"$DISK\"\n\
-            \"$0\" \"$@\" \"$DISK/out\" >/dev/null; echo freed $?\n\
-            cp -r \"$DISK/out\" copy";
-        let Some(output) = on_a_disk(&bench, &size, script, run) else { return };
+            \"$0\" \"$@\" \"$DISK/out{file}\" >/dev/null; echo freed $?\n\
+            cp -r \"$DISK/out\" copy"
+        );
+        let Some(output) = on_a_disk(&bench, size, &script, line) else { return };
         let said = unbroken(&output.stderr);
-        assert_eq!(lines(&output), ["full 6", "freed 0"], "{name}: {said}");
-        assert!(said.contains("02_tracks.csv") && said.contains("the disk is full"), "{name}: {said}");
-        same(&bench.path().join("copy"), &bench.path().join(name), name);
-        std::fs::remove_dir_all(bench.path().join("copy")).unwrap();
-    }
-}
-
-#[test]
-fn mined_scenarios_that_do_not_fit_end_well_once_there_is_space() {
-    let bench = Bench::new();
-    done(bench.path(), &["-q", "synth", "recordings", "--synth-recordings", "6"]);
-    let run = ["-q", "mine", "recordings"];
-    std::fs::create_dir_all(bench.path().join("mine")).unwrap();
-    done(bench.path(), &[&run[..], &["--out", "mine/s.jsonl"]].concat());
-    let script = "mkdir -p \"$DISK/out\"\n\
-        \"$0\" \"$@\" --out \"$DISK/out/s.jsonl\" >/dev/null; echo full $?\n\
-        ls \"$DISK/out\" | grep -c 'json'\n\
-        mount -o remount,size=64m \"$DISK\"\n\
-        \"$0\" \"$@\" --out \"$DISK/out/s.jsonl\" >/dev/null; echo freed $?\n\
-        cp -r \"$DISK/out\" copy";
-    for size in ["8k", "24k"] {
-        let Some(output) = on_a_disk(&bench, size, script, &run) else { return };
-        let said = unbroken(&output.stderr);
-        assert_eq!(lines(&output), ["full 6", "0", "freed 0"], "{size}: {said}");
-        assert!(said.contains("the disk is full"), "{size}: {said}");
-        same(&bench.path().join("copy"), &bench.path().join("mine"), size);
-        std::fs::remove_dir_all(bench.path().join("copy")).unwrap();
+        assert_eq!(lines(&output), ["full 6", "freed 0"], "{name}, {size}: {said}");
+        assert!(said.contains(cut_off) && said.contains("the disk is full"), "{name}, {size}: {said}");
+        program::same(&files(&dir.join("copy")), &files(&dir.join("whole").join(name)), name);
+        std::fs::remove_dir_all(dir.join("copy")).unwrap();
     }
 }
 
 #[test]
 fn a_disk_that_becomes_read_only_keeps_what_is_done() {
     let bench = Bench::new();
-    let whole = shared().join("sample");
     let script = "\
         \"$0\" \"$@\" --out \"$DISK/out\" --config run.stop_after_s=0.3 >/dev/null; echo stopped $?\n\
         mount -o remount,ro \"$DISK\"\n\
@@ -120,7 +105,7 @@ fn a_disk_that_becomes_read_only_keeps_what_is_done() {
     let said = unbroken(&output.stderr);
     assert_eq!(lines(&output), ["stopped 75", "kept 6", "new 6", "writable 0"], "{said}");
     assert_eq!(said.matches("mounted read-only").count(), 2, "{said}");
-    same(&bench.path().join("copy"), &whole, "read-only");
+    same(&bench.path().join("copy"), &shared().join("sample"));
 }
 
 #[test]
@@ -133,29 +118,23 @@ fn a_folder_without_permission_is_told_and_left_as_it_is() {
     mode(bench.path(), 0o755);
     mode(&out, 0o555);
     let is_root = std::fs::metadata(bench.path()).unwrap().uid() == 0;
-    for (name, run) in RUNS {
-        let args = [run, &["--out", "out"]].concat();
-        let mut command = if is_root {
-            // Permissions do not bind root.
-            let mut command = Command::new("setpriv");
-            command.args(["--reuid=65534", "--regid=65534", "--clear-groups", PROGRAM]);
-            command
-        } else {
-            Command::new(PROGRAM)
-        };
-        let Ok(output) = command.args(&args).current_dir(bench.path()).env("NO_COLOR", "1").output() else {
-            return skipped("needs setpriv to be somebody else than root");
-        };
-        let said = unbroken(&output.stderr);
-        if said.contains("setpriv:") {
-            return skipped("setpriv cannot change the user here, or that user cannot reach the program");
-        }
-        assert_eq!(output.status.code(), Some(6), "{name}: {said}");
-        assert!(said.contains("you have no permission") && said.contains("out"), "{name}: {said}");
-        assert_eq!(std::fs::read_dir(&out).unwrap().count(), 0, "{name}");
+    let line = format!("{STUDY} --out out");
+    let mut command = Command::new(if is_root { "setpriv" } else { PROGRAM });
+    if is_root {
+        // Permissions do not bind root.
+        command.args(["--reuid=65534", "--regid=65534", "--clear-groups", PROGRAM]);
     }
+    let Ok(output) = command.args(words(&line)).current_dir(bench.path()).env("NO_COLOR", "1").output() else {
+        return skipped("needs setpriv to be somebody else than root");
+    };
+    let said = unbroken(&output.stderr);
+    if said.contains("setpriv:") {
+        return skipped("setpriv cannot change the user here, or that user cannot reach the program");
+    }
+    assert_eq!(output.status.code(), Some(6), "{said}");
+    assert!(said.contains("you have no permission") && said.contains("out"), "{said}");
+    assert_eq!(std::fs::read_dir(&out).unwrap().count(), 0);
     mode(&out, 0o755);
-    let whole = shared().join("study");
-    done(bench.path(), &[RUNS[0].1, &["--out", "out"]].concat());
-    same(&out, &whole, "with permission");
+    ran(bench.path(), &line);
+    same(&out, &shared().join("study"));
 }
