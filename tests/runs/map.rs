@@ -24,11 +24,15 @@ fn value(category: Category, key: &str, value: f64) -> (&'static MapParameter, f
     (MapParameter::find(category, key, "--set").unwrap(), value)
 }
 
-/// A grid with these panels and fixed values.
-fn grid(category: Category, [x, y]: [&str; 2], panels: &[&str], fixed: &[(&str, f64)]) -> Grid {
-    let panel_axes = panels.iter().map(|text| axis(category, text)).collect();
-    let fixed = fixed.iter().map(|(key, number)| value(category, key, *number)).collect();
-    Grid::new(GridParts { panel_axes, fixed, ..parts(category, x, y) }).unwrap()
+/// A grid of these axes (x, then y), panels and fixed values.
+fn grid(category: Category, axes: &str, panels: &str, fixed: &str) -> Grid {
+    let (x, y) = axes.split_once(' ').unwrap();
+    let fixed = fixed.split_whitespace().map(|text| {
+        let (key, number) = text.split_once('=').unwrap();
+        value(category, key, number.parse().unwrap())
+    });
+    let panel_axes = panels.split_whitespace().map(|text| axis(category, text)).collect();
+    Grid::new(GridParts { panel_axes, fixed: fixed.collect(), ..parts(category, x, y) }).unwrap()
 }
 
 /// Does a model collide, cell by cell?
@@ -77,9 +81,8 @@ proptest! {
 
     #[test]
     fn a_cell_and_its_places_are_one_to_one(nx in 1_u32..9, ny in 1_u32..7, egos in 1_u32..5, others in 1_u32..4) {
-        let (x, y) = (format!("gap_m=1..{nx}/1"), format!("lateral_speed_mps=1..{ny}/1"));
-        let panels = [format!("ego_speed_mps=21..{}/1", 20 + egos), format!("other_speed_mps=11..{}/1", 10 + others)];
-        let grid = grid(Category::CutIn, [&x, &y], &panels.each_ref().map(String::as_str), &[]);
+        let panels = format!("ego_speed_mps=21..{}/1 other_speed_mps=11..{}/1", 20 + egos, 10 + others);
+        let grid = grid(Category::CutIn, &format!("gap_m=1..{nx}/1 lateral_speed_mps=1..{ny}/1"), &panels, "");
         prop_assert_eq!(grid.cell_count(), (nx * ny * egos * others) as usize);
         for cell in 0..grid.cell_count() {
             let (panel, i, j) = grid.places(cell);
@@ -94,8 +97,7 @@ proptest! {
 
     #[test]
     fn a_boundary_has_a_line_between_two_neighbours_exactly_where_they_differ(kinds in prop::collection::vec(0_u8..3, 30)) {
-        let axes = ["deceleration_mps2=1..6/1", "ego_speed_mps=11..15/1"];
-        let grid = grid(Category::Lvd, axes, &[], &[("thw_s", 1.0)]);
+        let grid = grid(Category::Lvd, "deceleration_mps2=1..6/1 ego_speed_mps=11..15/1", "", "thw_s=1");
         let kind = |i: usize, j: usize| usize::from(kinds[j * 6 + i]);
         let lines = boundary(&grid, &kind);
         let length: usize = lines.iter().map(|((a, b), (c, d))| (c - a) + (d - b)).sum();
@@ -124,30 +126,10 @@ fn every_cell_is_the_lane_that_its_numbers_say() {
         GridParts { native_gap: true, ..parts(lvd, "deceleration_mps2=5..10/0.5", "ego_speed_kmh=30..130/20") };
     for grid in [
         // The gap across, upwards, in the panels and fixed; headways likewise.
-        grid(
-            cut_in,
-            ["gap_m=2..50/4", "lateral_speed_mps=0..1.5/0.3"],
-            &[],
-            &[("ego_speed_kmh", 100.0), ("other_speed_kmh", 60.0)],
-        ),
-        grid(
-            cut_in,
-            ["lateral_speed_mps=0.3..1.5/0.3", "thw_s=0.2..2/0.2"],
-            &["ego_speed_mps=20,30"],
-            &[("other_speed_mps", 15.0)],
-        ),
-        grid(
-            cut_out,
-            ["ahead_gap_m=5..95/10", "lateral_speed_mps=0.5..2/0.5"],
-            &["gap_m=10,30"],
-            &[("ego_speed_kmh", 100.0)],
-        ),
-        grid(
-            lvd,
-            ["deceleration_mps2=1..9/1", "ego_speed_kmh=30..130/20"],
-            &[],
-            &[("thw_s", 0.8), ("end_speed_kmh", 20.0)],
-        ),
+        grid(cut_in, "gap_m=2..50/4 lateral_speed_mps=0..1.5/0.3", "", "ego_speed_kmh=100 other_speed_kmh=60"),
+        grid(cut_in, "lateral_speed_mps=0.3..1.5/0.3 thw_s=0.2..2/0.2", "ego_speed_mps=20,30", "other_speed_mps=15"),
+        grid(cut_out, "ahead_gap_m=5..95/10 lateral_speed_mps=0.5..2/0.5", "gap_m=10,30", "ego_speed_kmh=100"),
+        grid(lvd, "deceleration_mps2=1..9/1 ego_speed_kmh=30..130/20", "", "thw_s=0.8 end_speed_kmh=20"),
         Grid::new(native).unwrap(),
     ] {
         for name in ["paper", "jrc-2021", "un-r157"] {
@@ -165,8 +147,8 @@ fn every_cell_is_the_lane_that_its_numbers_say() {
 
 #[test]
 fn a_cell_is_what_simulate_says_of_the_same_numbers() {
-    let speeds = [("ego_speed_mps", 30.0), ("other_speed_mps", 18.0)];
-    let grid = grid(Category::CutIn, ["gap_m=7,21,35", "lateral_speed_mps=0.4,1.1"], &[], &speeds);
+    let speeds = "ego_speed_mps=30 other_speed_mps=18";
+    let grid = grid(Category::CutIn, "gap_m=7,21,35 lateral_speed_mps=0.4,1.1", "", speeds);
     let map = swept(&GridPlan::new(grid.clone(), &profile("paper"), &[ModelId::Rss]).unwrap());
     let mut failures = 0;
     for cell in 0..grid.cell_count() {
@@ -296,10 +278,8 @@ fn shares_of_a_preset_vary_smoothly_with_the_time_step() {
 /// Where no vehicle comes into the ego's lane, and where no lane is over in time, there is no map.
 #[test]
 fn a_map_in_which_every_lane_ends_at_the_cap_is_an_error_that_says_what_to_check() {
-    let at_lateral_speed = |lateral: &str| {
-        let speeds = [("ego_speed_mps", 30.0), ("other_speed_mps", 20.0)];
-        grid(Category::CutIn, ["gap_m=10,20", lateral], &[], &speeds)
-    };
+    let speeds = "ego_speed_mps=30 other_speed_mps=20";
+    let at_lateral_speed = |lateral: &str| grid(Category::CutIn, &format!("gap_m=10,20 {lateral}"), "", speeds);
     let beside = || at_lateral_speed("lateral_speed_mps=0");
     let sweep = |grid: Grid, profile: &Profile| {
         let plan = GridPlan::new(grid, profile, &[ModelId::Fsm]).unwrap();
@@ -445,8 +425,8 @@ fn an_undecided_cell_has_a_neighbour_with_the_other_verdict_and_a_decided_one_ke
 #[test]
 fn a_cell_is_undecided_where_the_single_case_is() {
     use lanesweep::run::check::{Check, RunEnd, Subject};
-    let speeds = [("other_speed_kmh", 30.0), ("ego_speed_kmh", 60.0)];
-    let grid = grid(Category::CutIn, ["gap_m=8..20/0.5", "lateral_speed_mps=0.5..1.5/0.25"], &[], &speeds);
+    let speeds = "other_speed_kmh=30 ego_speed_kmh=60";
+    let grid = grid(Category::CutIn, "gap_m=8..20/0.5 lateral_speed_mps=0.5..1.5/0.25", "", speeds);
     let profile = profile("un-r157");
     let options = MapOptions {
         grids: MapGrids::Own(Box::new(grid.clone())),

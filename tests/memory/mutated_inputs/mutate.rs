@@ -19,48 +19,9 @@ impl Dice {
 }
 
 /// Numbers that programs stumble over.
-const NUMBERS: [&str; 40] = [
-    "NaN",
-    "inf",
-    "-inf",
-    "Infinity",
-    "1e308",
-    "-1e308",
-    "1e400",
-    "5e-324",
-    "1e-300",
-    "1e-9",
-    "1e-3",
-    "-1",
-    "0",
-    "-0.0",
-    "1",
-    "2",
-    "3",
-    "1.0",
-    "0.5",
-    "63",
-    "64",
-    "65",
-    "255",
-    "256",
-    "65536",
-    "1000000",
-    "1000000.0",
-    "2147483647",
-    "2147483648",
-    "4000000000",
-    "4294967295",
-    "4294967296",
-    "9007199254740993",
-    "9223372036854775807",
-    "-9223372036854775808",
-    "18446744073709551615",
-    "18446744073709551616",
-    "null",
-    "1e6",
-    "1e15",
-];
+const NUMBERS: &str = "NaN inf -inf Infinity 1e308 -1e308 1e400 5e-324 1e-300 1e-9 1e-3 -1 0 -0.0 1 \
+    2 3 1.0 0.5 63 64 65 255 256 65536 1000000 1000000.0 2147483647 \
+    2147483648 4000000000 4294967295 4294967296 9007199254740993 9223372036854775807 -9223372036854775808 18446744073709551615 18446744073709551616 null 1e6 1e15";
 
 /// Fragments of the formats.
 const FRAGMENTS: [&str; 18] = [
@@ -124,7 +85,7 @@ fn change(dice: &mut Dice, bytes: &mut Vec<u8>, others: &[Vec<u8>]) {
         _ => {
             let values = numbers(bytes);
             if !values.is_empty() {
-                let new = NUMBERS[dice.below(NUMBERS.len())];
+                let new = NUMBERS.split(' ').nth(dice.below(40)).unwrap();
                 bytes.splice(values[dice.below(values.len())].clone(), new.bytes());
             }
         }

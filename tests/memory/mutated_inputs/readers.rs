@@ -20,7 +20,7 @@ use lanesweep::traffic::trajectory::Inputs;
 use lanesweep::traffic::trajectory::tracks::{Preset, TrackFile, read_usable};
 use lanesweep::{Error, Place, Result};
 
-use super::seeds::{Seeds, density_of};
+use super::seeds::Seeds;
 
 /// Puts the checksum right that a change has spoilt.
 pub type Reseal = fn(&[u8], &Path, &Seeds) -> Option<Vec<u8>>;
@@ -36,32 +36,30 @@ pub struct Reader {
 }
 
 pub fn all(seeds: &Seeds) -> Vec<Reader> {
-    let plain = |name, seeds: &[Vec<u8>], read| Reader { name, seeds: seeds.to_vec(), read, reseal: None };
-    let [tracks, tracks_meta, recording_meta] = &seeds.recording;
-    let mut readers = vec![
-        plain("tracks", std::slice::from_ref(tracks), |b, d, s, _| recording(0, b, d, s)),
-        plain("tracksMeta", std::slice::from_ref(tracks_meta), |b, d, s, _| recording(1, b, d, s)),
-        plain("recordingMeta", std::slice::from_ref(recording_meta), |b, d, s, _| recording(2, b, d, s)),
-        plain("scenarios", &seeds.scenario_files, scenarios),
-        plain("scenario table", &seeds.scenario_tables, |b, d, s, h| scenario_table("s.csv", b, d, s, h)),
-        plain("exposure", &seeds.exposures, exposure),
-        plain("profile", &seeds.profiles, profile),
-        plain("mining options", &seeds.mining, mining),
-        plain("parameterization options", &seeds.parameterization, parameterization),
-        plain("score options", &seeds.score, |b, _, _, _| options::<ScoreOptions>(b)?.validate()),
-        plain("proposal", &seeds.proposals, proposal),
-        plain("exiD tracks", &seeds.exid, exid),
-        plain("track table", &seeds.track_tables, |b, d, _, _| tracks_named("own.csv", b, d)),
-        plain("preset", &seeds.presets, preset),
-    ];
-    readers.push(Reader { reseal: Some(reseal_density), ..plain("density", &seeds.densities, density) });
-    readers.push(plain("external S'", &seeds.scenario_files[..1], external));
-    readers.push(plain("part", &seeds.parts, part));
-    readers.push(plain("plan", &seeds.plans, plan));
-    readers.push(plain("journal", &seeds.journals, journal));
-    readers.push(plain("weighted part", &seeds.weighted_parts, weighted_part));
-    readers.push(plain("study part", &seeds.study_parts, study_part));
-    readers
+    let plain = |name, read| Reader { name, seeds: seeds.files[name].clone(), read, reseal: None };
+    vec![
+        plain("tracks", |b, d, s, _| recording(0, b, d, s)),
+        plain("tracksMeta", |b, d, s, _| recording(1, b, d, s)),
+        plain("recordingMeta", |b, d, s, _| recording(2, b, d, s)),
+        plain("scenarios", |b, d, s, h| scenarios("s.jsonl", b, d, s, h)),
+        plain("scenario table", |b, d, s, h| scenarios("s.csv", b, d, s, h)),
+        plain("exposure", exposure),
+        plain("profile", profile),
+        plain("mining options", mining),
+        plain("parameterization options", parameterization),
+        plain("score options", |b, _, _, _| options::<ScoreOptions>(b)?.validate()),
+        plain("proposal", proposal),
+        plain("exiD tracks", exid),
+        plain("track table", |b, d, _, _| tracks_named("own.csv", b, d)),
+        plain("preset", preset),
+        Reader { reseal: Some(reseal_density), ..plain("density", density) },
+        plain("external S'", external),
+        plain("part", part),
+        plain("plan", plan),
+        plain("journal", journal),
+        plain("weighted part", weighted_part),
+        plain("study part", study_part),
+    ]
 }
 
 /// Alone in a folder, detected by its content, with whatever it is doubted for.
@@ -89,7 +87,7 @@ fn exid(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {
 
 fn preset(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
     let path = file(bytes, dir, "own.toml");
-    let table = file(&seeds.track_tables[0], dir, "own.csv");
+    let table = file(&seeds.files["track table"][0], dir, "own.csv");
     let beside = [file(b"id,l\n1,4.5\n", dir, "own_meta.csv"), file(b"fps\n10\n", dir, "own_rec.csv")];
     let preset = Preset::load(&path.to_string_lossy())?;
     let read = read_usable(&TrackFile { path: table.clone(), id: "own".to_owned() }, &preset, Implausible::Accepted);
@@ -129,12 +127,7 @@ fn study(scenarios: &[Scenario], profile: &Profile, options: &ParameterizationOp
     if heavy { run_some(&plan, 1) } else { Ok(()) }
 }
 
-fn scenarios(bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> {
-    let scenarios = read_scenarios(&file(bytes, dir, "s.jsonl"))?;
-    study(&scenarios, &seeds.profile, &ParameterizationOptions::default(), heavy)
-}
-
-fn scenario_table(name: &str, bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> {
+fn scenarios(name: &str, bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> {
     let scenarios = read_scenarios(&file(bytes, dir, name))?;
     study(&scenarios, &seeds.profile, &ParameterizationOptions::default(), heavy)
 }
@@ -196,7 +189,7 @@ fn external(bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> 
 }
 
 fn proposal(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
-    let proposal = read_proposal(&file(bytes, dir, "g.json"), density_of(seeds))?;
+    let proposal = read_proposal(&file(bytes, dir, "g.json"), &seeds.density)?;
     let stream = Stream { seed: 5, purpose: 1 };
     (0..20).for_each(|index| drop(proposal.draw(&stream, index, 0)));
     Ok(())
@@ -204,11 +197,7 @@ fn proposal(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
 
 /// The message of a density file whose content was changed says which checksum would fit.
 fn reseal_density(bytes: &[u8], dir: &Path, _: &Seeds) -> Option<Vec<u8>> {
-    with_named_checksum(bytes, &read_density(&file(bytes, dir, "d.json")).err()?)
-}
-
-fn with_named_checksum(bytes: &[u8], error: &Error) -> Option<Vec<u8>> {
-    let message = error.to_string();
+    let message = read_density(&file(bytes, dir, "d.json")).err()?.to_string();
     let (_, rest) = message.split_once("content_sha256`: is ")?;
     let (old, rest) = rest.split_once(", but the content has ")?;
     let new = rest.get(..64)?;
@@ -221,7 +210,7 @@ fn part(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
     for tally in read.segments {
         tally.samples();
         tally.valid();
-        let plan = small_plan(density_of(seeds), &seeds.profile)?;
+        let plan = small_plan(&seeds.density, &seeds.profile)?;
         let joined = SampleTally::empty(&plan).merge(tally.clone())?;
         let back = tally.clone().merge(SampleTally::empty(&plan))?;
         joined.samples();

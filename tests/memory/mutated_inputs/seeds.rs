@@ -1,18 +1,20 @@
 //! Valid inputs, made by the program itself.
 
+use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::Path;
 
 use lanesweep::engine::{Backend, CpuBackend, LanePlan, Partial, SampleTally, Wanted};
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
-use lanesweep::run::parts::{Counted, Journal, Part, seal, write_part};
+use lanesweep::run::parts::{Counted, Journal, MergeableCounts, Part, seal, write_part};
 use lanesweep::run::sampling::{Question, WeightedTally, proposal_text};
 use lanesweep::run::score::ScoreOptions;
 use lanesweep::run::study::{StudyOptions, outline_study};
-use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions};
+use lanesweep::scenario::parameterization::ParameterizationOptions;
 use lanesweep::scenario::{Category, Scenario, write_scenarios};
 use lanesweep::scenario::{DataProvenance, Driven};
-use lanesweep::stats::density::{DensityModel, FitOptions, write_density};
+use lanesweep::stats::density::{DensityModel, write_density};
 use lanesweep::stats::estimate::{BlockSums, WeightSums};
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::Recording;
@@ -21,6 +23,7 @@ use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 use super::plans;
 use super::readers::{CRITERION, PART_UNITS, STUDY_UNITS, WEIGHTED_UNITS, small_plan};
 use super::small;
+use crate::common::mined::{fitted, provenance};
 
 /// Valid inputs and what the next steps need beside them.
 pub struct Seeds {
@@ -29,32 +32,12 @@ pub struct Seeds {
     pub loaded: Recording,
     /// A few of each category.
     pub scenarios: Vec<Scenario>,
-    pub scenario_files: Vec<Vec<u8>>,
-    /// A row per instant, and one per concrete case.
-    pub scenario_tables: Vec<Vec<u8>>,
-    pub exposures: Vec<Vec<u8>>,
-    pub profiles: Vec<Vec<u8>>,
-    pub mining: Vec<Vec<u8>>,
-    pub parameterization: Vec<Vec<u8>>,
-    pub score: Vec<Vec<u8>>,
-    pub densities: Vec<Vec<u8>>,
-    pub proposals: Vec<Vec<u8>>,
-    pub exid: Vec<Vec<u8>>,
-    pub track_tables: Vec<Vec<u8>>,
-    pub presets: Vec<Vec<u8>>,
-    pub parts: Vec<Vec<u8>>,
-    pub plans: Vec<Vec<u8>>,
-    pub journals: Vec<Vec<u8>>,
-    pub weighted_parts: Vec<Vec<u8>>,
-    pub study_parts: Vec<Vec<u8>>,
+    /// Of each reader, by its name.
+    pub files: BTreeMap<&'static str, Vec<Vec<u8>>>,
     pub profile: Profile,
     pub study: LanePlan,
-    density: DensityModel,
-}
-
-/// The density that proposals and parts belong to.
-pub fn density_of(seeds: &Seeds) -> &DensityModel {
-    &seeds.density
+    /// The density that proposals and parts belong to.
+    pub density: DensityModel,
 }
 
 fn first_of(scenarios: &[Scenario], category: Category, n: usize) -> Vec<Scenario> {
@@ -67,6 +50,13 @@ fn written(write: impl FnOnce(&Path)) -> Vec<u8> {
     let path = dir.path().join("file.json");
     write(&path);
     std::fs::read(path).unwrap()
+}
+
+/// The file of a part of one segment.
+fn part<T: MergeableCounts>(units: Range<u64>, segment: T) -> Vec<u8> {
+    let (run_sha256, lanes_redone_and_rechecked) = ("00".to_owned(), [0; 2]);
+    let part = Part { run_sha256, units, lanes_redone_and_rechecked, segments: vec![segment] };
+    written(|path| write_part(path, &part).unwrap())
 }
 
 /// A table of a few vehicles: header, and a line for vehicle, sample, x, y.
@@ -173,18 +163,9 @@ impl Seeds {
         let mined = mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap().scenarios;
         let few: Vec<Scenario> = Category::ALL.into_iter().flat_map(|c| first_of(&mined, c, 2)).collect();
         let profile = Profile::load("paper").unwrap();
-        let fit = |category, key, n| {
-            let facts = DataProvenance {
-                data: "synthetic".to_owned(),
-                synthetic: true,
-                scenarios_sha256: String::new(),
-                driven: None,
-            };
-            let options = FitOptions { valid_draws: 200, ..FitOptions::default() };
-            let id = Parameterization::find(category, key).unwrap();
-            DensityModel::fit(id, &first_of(&mined, category, n), &facts, &options).unwrap().model
-        };
+        let fit = |category, key, n| fitted(&first_of(&mined, category, n), category, key, false);
         let density = fit(Category::CutIn, "2", 8);
+        let file_of = |density: &DensityModel| written(|path| write_density(path, density).unwrap());
         let others = [fit(Category::Lvd, "ii", 6), fit(Category::Lvd, "iii", 8), fit(Category::CutOut, "b", 10)];
         let plan = small_plan(&density, &profile).unwrap();
         let chunk = CpuBackend::<f64>::reference().prepare(&plan).unwrap().run(PART_UNITS, Wanted::Outcomes).unwrap();
@@ -193,73 +174,56 @@ impl Seeds {
             let (mut journal, _) = Journal::open(path, "00", PART_UNITS).unwrap();
             journal.append(&[Counted { counts: tally.clone(), redone_and_rechecked: [0; 2] }]).unwrap();
         });
-        let (run_sha256, lanes_redone_and_rechecked) = ("00".to_owned(), [0; 2]);
-        let part = Part { run_sha256, units: PART_UNITS, lanes_redone_and_rechecked, segments: vec![tally] };
-        let part = written(|path| write_part(path, &part).unwrap());
         let sums = |k: u64| WeightSums { draws: k, failing: 0.5, ..WeightSums::default() };
         let leaves: Vec<WeightSums> = (0..9).map(sums).collect();
         let question = |model| Question { model, criterion: CRITERION, headway: 0 };
         let sums = ModelId::ALL.into_iter().map(|m| (question(m), BlockSums::of_leaves(5, &leaves))).collect();
-        let weighted = Part {
-            run_sha256: "00".to_owned(),
-            units: WEIGHTED_UNITS,
-            lanes_redone_and_rechecked: [0; 2],
-            segments: vec![WeightedTally { sums }],
-        };
         let study = plans::plan(&[(Category::CutIn, 2, &["1"]), (Category::Lvd, 2, &["i"])]);
         let lane = |lane: u64| (lanesweep::engine::Verdicts((lane % 16) as u8), lane as f64 / 8.0);
-        let study_part = Part {
-            run_sha256: "00".to_owned(),
-            units: STUDY_UNITS,
-            lanes_redone_and_rechecked: [0; 2],
-            segments: vec![Partial::from_chunk(&study, &plans::chunk(&study, STUDY_UNITS, &lane, false)).unwrap()],
-        };
+        let partial = Partial::from_chunk(&study, &plans::chunk(&study, STUDY_UNITS, &lane, false)).unwrap();
         let driven = Some(Driven { hours: Some(1.5), kilometres: Some(90.0) });
-        let exposure =
-            DataProvenance { scenarios_sha256: "00".to_owned(), data: "synthetic".to_owned(), synthetic: true, driven };
+        let exposure = DataProvenance { scenarios_sha256: "00".to_owned(), driven, ..provenance() };
         let texts = small::Texts::small();
+        let recording = [texts.tracks, texts.tracks_meta, texts.recording_meta].map(String::into_bytes);
+        let profile_text = |name: &str| toml::to_string(&Profile::load(name).unwrap()).unwrap().into_bytes();
+        let scenario_files =
+            [&few[..], &few[..1], &few[4..5]].map(|s| written(|path| write_scenarios(path, s).unwrap()));
+        let exposure_file = {
+            let dir = tempfile::tempdir().unwrap();
+            exposure.write_beside(&dir.path().join("s.jsonl"), serde_json::Value::Null).unwrap();
+            std::fs::read(dir.path().join("s.exposure.json")).unwrap()
+        };
+        let plan_file = {
+            let outlined = outline_study(&few, &profile, &StudyOptions::default()).unwrap();
+            let (head, mut plan) = (seal("plan", outlined.head()).unwrap().0, Vec::new());
+            outlined.write_file(&head, &mut plan).unwrap();
+            plan
+        };
         let toml = |text: String| vec![text.into_bytes()];
-        Seeds {
-            recording: [texts.tracks, texts.tracks_meta, texts.recording_meta].map(String::into_bytes),
-            loaded: small::recording(),
-            scenario_files: [&few[..], &few[..1], &few[4..5]]
-                .map(|s| written(|path| write_scenarios(path, s).unwrap()))
-                .into(),
-            scenario_tables: vec![INSTANTS.into(), CASES.into()],
-            exposures: vec![{
-                let dir = tempfile::tempdir().unwrap();
-                exposure.write_beside(&dir.path().join("s.jsonl"), serde_json::Value::Null).unwrap();
-                std::fs::read(dir.path().join("s.exposure.json")).unwrap()
-            }],
-            profiles: ["paper", "jrc-2021"]
-                .map(|n| toml::to_string(&Profile::load(n).unwrap()).unwrap().into_bytes())
-                .into(),
-            mining: toml(toml::to_string(&MiningOptions::default()).unwrap()),
-            parameterization: toml(toml::to_string(&ParameterizationOptions::default()).unwrap()),
-            score: toml(toml::to_string(&ScoreOptions::default()).unwrap()),
-            densities: [&density]
-                .into_iter()
-                .chain(&others)
-                .map(|d| written(|p| write_density(p, d).unwrap()))
-                .collect(),
-            exid: exid(),
-            track_tables: track_tables(),
-            presets: presets(),
-            proposals: vec![proposal_text(&density, &density.kde.mixture().unwrap()).unwrap().into_bytes()],
-            parts: vec![part],
-            plans: vec![{
-                let outlined = outline_study(&few, &profile, &StudyOptions::default()).unwrap();
-                let (head, mut plan) = (seal("plan", outlined.head()).unwrap().0, Vec::new());
-                outlined.write_file(&head, &mut plan).unwrap();
-                plan
-            }],
-            journals: vec![journal],
-            weighted_parts: vec![written(|p| write_part(p, &weighted).unwrap())],
-            study_parts: vec![written(|p| write_part(p, &study_part).unwrap())],
-            profile,
-            study,
-            density,
-            scenarios: few,
-        }
+        let files = BTreeMap::from([
+            ("tracks", vec![recording[0].clone()]),
+            ("tracksMeta", vec![recording[1].clone()]),
+            ("recordingMeta", vec![recording[2].clone()]),
+            ("external S'", scenario_files[..1].to_vec()),
+            ("scenarios", scenario_files.into()),
+            // A row per instant, and one per concrete case.
+            ("scenario table", vec![INSTANTS.into(), CASES.into()]),
+            ("exposure", vec![exposure_file]),
+            ("profile", ["paper", "jrc-2021"].map(profile_text).into()),
+            ("mining options", toml(toml::to_string(&MiningOptions::default()).unwrap())),
+            ("parameterization options", toml(toml::to_string(&ParameterizationOptions::default()).unwrap())),
+            ("score options", toml(toml::to_string(&ScoreOptions::default()).unwrap())),
+            ("density", std::iter::once(&density).chain(&others).map(file_of).collect()),
+            ("exiD tracks", exid()),
+            ("track table", track_tables()),
+            ("preset", presets()),
+            ("proposal", toml(proposal_text(&density, &density.kde.mixture().unwrap()).unwrap())),
+            ("part", vec![part(PART_UNITS, tally)]),
+            ("plan", vec![plan_file]),
+            ("journal", vec![journal]),
+            ("weighted part", vec![part(WEIGHTED_UNITS, WeightedTally { sums })]),
+            ("study part", vec![part(STUDY_UNITS, partial)]),
+        ]);
+        Seeds { recording, loaded: small::recording(), scenarios: few, files, profile, study, density }
     }
 }
