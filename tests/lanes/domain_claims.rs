@@ -212,6 +212,11 @@ fn no_driver_of_the_regulation_reacts_to_a_gap_that_opens() {
         }
         assert!(run(&profile, &opens, ModelId::Cchdm, 3.0 / (60.0 / 3.6)).verdicts.failed(Criterion::Collision));
     }
+    // By hand, 12.08 m apart at equal speeds: (12.08 m − 3.4 m/s²·τ²)/(6.8 m/s²·τ), the TTC, is 2 s at τ = 0.748 s.
+    let un = Profile::load("un-r157").unwrap();
+    let [cchdm, fsm] = [ModelId::Cchdm, ModelId::Fsm].map(|model| run(&un, &opens, model, 3.0 / (60.0 / 3.6)));
+    let reacts_s = f64::from(cchdm.reaction_step) * un.frame.dt_s;
+    assert!((reacts_s - 2.382).abs() < 0.011 && fsm.verdicts.failed(Criterion::Collision), "{reacts_s} s");
 }
 
 #[test]

@@ -8,35 +8,32 @@ use std::process::{Command, Output};
 use lanesweep::cli::settings::{Key, KeyKind};
 use serde_json::Value;
 
+use crate::common::program::{PROGRAM, json, unbroken, words};
+
 /// Runs the program with nothing configured but what the test configures.
-fn run(dir: &Path, variables: &[(&str, &str)], args: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_lanesweep"));
-    command.current_dir(dir).env_remove("LANESWEEP_CONFIG").envs(variables.iter().copied()).args(args);
+fn run(dir: &Path, variables: &[(&str, &str)], line: &str) -> Output {
+    let mut command = Command::new(PROGRAM);
+    command.current_dir(dir).env_remove("LANESWEEP_CONFIG").envs(variables.iter().copied()).args(words(line));
     command.output().unwrap()
 }
 
-fn good(dir: &Path, variables: &[(&str, &str)], args: &[&str]) -> String {
-    let output = run(dir, variables, args);
-    assert_eq!(output.status.code(), Some(0), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
+fn good(dir: &Path, variables: &[(&str, &str)], line: &str) -> String {
+    let output = run(dir, variables, line);
+    assert_eq!(output.status.code(), Some(0), "{line}: {}", unbroken(&output.stderr));
     String::from_utf8(output.stdout).unwrap()
 }
 
 /// The message of a run that must be refused, in one line.
-fn refused(dir: &Path, variables: &[(&str, &str)], args: &[&str]) -> String {
-    let output = run(dir, variables, args);
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(2), "{args:?}: {said}");
-    assert!(output.stdout.is_empty(), "{args:?}");
-    said.replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ")
-}
-
-fn json(path: &Path) -> Value {
-    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+fn refused(dir: &Path, variables: &[(&str, &str)], line: &str) -> String {
+    let output = run(dir, variables, line);
+    let said = unbroken(&output.stderr);
+    assert!(output.status.code() == Some(2) && output.stdout.is_empty(), "{line}: {said}");
+    said
 }
 
 /// Value and source of a key.
-fn shown(dir: &Path, variables: &[(&str, &str)], args: &[&str], key: &str) -> (Value, String) {
-    let text = good(dir, variables, &[&["config", "show", "--format", "json"], args].concat());
+fn shown(dir: &Path, variables: &[(&str, &str)], args: &str, key: &str) -> (Value, String) {
+    let text = good(dir, variables, &format!("config show --format json {args}"));
     let list: Value = serde_json::from_str(&text).unwrap();
     let found = list.as_array().unwrap().iter().find(|one| one["key"] == key).unwrap_or_else(|| panic!("{key}"));
     (found["value"].clone(), found["source"].as_str().unwrap().to_owned())
@@ -47,28 +44,26 @@ fn a_flag_wins_over_an_assignment_over_a_file_over_the_default() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     std::fs::write(dir.join("a.toml"), "# mine\n[generator]\nseed = 2\n[run]\ndt_s = 0.2\n").unwrap();
-    let file = ["--config", "a.toml"];
-    let assigned = ["--config", "a.toml", "--config", "generator.seed=4", "--config", "run.dt_s=0.4"];
-    let flags = [&assigned[..], &["--config", "generator.seed=5", "--dt", "0.5"]].concat();
-    let seed = |variables: &[(&str, &str)], args: &[&str]| shown(dir, variables, args, "generator.seed");
-    let dt = |variables: &[(&str, &str)], args: &[&str]| shown(dir, variables, args, "run.dt_s");
+    let file = "--config a.toml";
+    let assigned = "--config a.toml --config generator.seed=4 --config run.dt_s=0.4";
+    let flags = format!("{assigned} --config generator.seed=5 --dt 0.5");
+    let seed = |variables: &[(&str, &str)], args: &str| shown(dir, variables, args, "generator.seed");
+    let dt = |args: &str| shown(dir, &[], args, "run.dt_s");
     let is = |value: Value, source: &str| (value, source.to_owned());
-    assert_eq!(seed(&[], &[]), is(20_240_901.into(), "default"));
-    assert_eq!(dt(&[], &[]), is(Value::Null, "default"));
-    assert_eq!(seed(&[], &file), is(2.into(), "file a.toml, line 3"));
-    assert_eq!(dt(&[], &file), is(0.2.into(), "file a.toml, line 5"));
-    assert_eq!(seed(&[], &assigned), is(4.into(), "flag --config"));
-    assert_eq!(dt(&[], &assigned), is(0.4.into(), "flag --config"));
-    assert_eq!(dt(&[], &flags), is(0.5.into(), "flag --dt"));
-    assert_eq!(seed(&[], &flags), is(5.into(), "flag --config"));
+    assert_eq!([seed(&[], ""), dt("")], [is(20_240_901.into(), "default"), is(Value::Null, "default")]);
+    assert_eq!(seed(&[], file), is(2.into(), "file a.toml, line 3"));
+    assert_eq!(dt(file), is(0.2.into(), "file a.toml, line 5"));
+    assert_eq!(seed(&[], assigned), is(4.into(), "flag --config"));
+    assert_eq!(dt(assigned), is(0.4.into(), "flag --config"));
+    assert_eq!([seed(&[], &flags), dt(&flags)], [is(5.into(), "flag --config"), is(0.5.into(), "flag --dt")]);
     // The environment names the file where no flag does, and nothing after `=` is the default again.
-    assert_eq!(seed(&[("LANESWEEP_CONFIG", "a.toml")], &[]), is(2.into(), "file a.toml, line 3"));
+    assert_eq!(seed(&[("LANESWEEP_CONFIG", "a.toml")], ""), is(2.into(), "file a.toml, line 3"));
     std::fs::write(dir.join("b.toml"), "").unwrap();
-    assert_eq!(seed(&[("LANESWEEP_CONFIG", "a.toml")], &["--config", "b.toml"]).1, "default");
-    assert_eq!(seed(&[], &["--config", "a.toml", "--config", "generator.seed="]).0, Value::from(20_240_901));
+    assert_eq!(seed(&[("LANESWEEP_CONFIG", "a.toml")], "--config b.toml").1, "default");
+    assert_eq!(seed(&[], "--config a.toml --config generator.seed=").0, Value::from(20_240_901));
     // Nothing that is not named is read.
     std::fs::write(dir.join("lanesweep.toml"), "[generator]\nseed = 9\n").unwrap();
-    assert_eq!(seed(&[], &[]).1, "default");
+    assert_eq!(seed(&[], "").1, "default");
 }
 
 #[test]
@@ -78,22 +73,20 @@ fn every_verb_takes_its_values_from_all_layers() {
     let tables = "[run]\nbackend = \"cpu\"\n[generator]\nrecordings = 2\nduration_s = 100\n[score]\nseed = 11\n\
                   min_failures = 20\n[fit]\nseed = 12\nvalid_draws = 1000\n[sample]\nseed = 13\nsamples = 1e2\n";
     std::fs::write(dir.join("a.toml"), tables).unwrap();
-    let fit = ["fit", "--categories", "lvd", "--parameterizations", "i", "--out", "lvd-i.json"];
-    let verbs: [(&[&str], &str, &str, &str, u64); 3] = [
-        (&["study"], "lanesweep-out/run.json", "/score/seed", "score", 11),
-        (&fit, "lvd-i.json", "/p_valid/seed", "fit", 12),
-        (&["sample", "lvd-i.json"], "lanesweep-sample/estimate.json", "/seed", "sample", 13),
-    ];
-    for (verb, result, pointer, table, in_file) in verbs {
-        let assignment = format!("{table}.seed=31");
-        let with = |args: &[&str]| {
-            good(dir, &[], &[&["-q", "--config", "a.toml"], verb, args].concat());
+    for (verb, result, pointer, table, in_file) in [
+        ("study", "lanesweep-out/run.json", "/score/seed", "score", 11),
+        ("fit --categories lvd --parameterizations i --out lvd-i.json", "lvd-i.json", "/p_valid/seed", "fit", 12),
+        ("sample lvd-i.json", "lanesweep-sample/estimate.json", "/seed", "sample", 13),
+    ] {
+        let assignment = format!("--config {table}.seed=31");
+        let with = |args: &str| {
+            good(dir, &[], &format!("-q --config a.toml {verb} {args}"));
             let record = json(&dir.join(result));
             record.pointer(pointer).and_then(Value::as_u64)
         };
-        assert_eq!(with(&[]), Some(in_file), "{verb:?}: file");
-        assert_eq!(with(&["--config", &assignment]), Some(31), "{verb:?}: assignment");
-        assert_eq!(with(&["--config", &assignment, "--seed", "41"]), Some(41), "{verb:?}: flag");
+        assert_eq!(with(""), Some(in_file), "{verb}: file");
+        assert_eq!(with(&assignment), Some(31), "{verb}: assignment");
+        assert_eq!(with(&format!("{assignment} --seed 41")), Some(41), "{verb}: flag");
     }
     let record = json(&dir.join("lanesweep-out/run.json"));
     let settings = record["settings"].as_array().unwrap();
@@ -107,22 +100,21 @@ fn every_verb_takes_its_values_from_all_layers() {
 #[test]
 fn a_variable_that_would_be_ignored_is_named_and_a_misspelt_one_is_refused() {
     let dir = tempfile::tempdir().unwrap();
-    let show = ["config", "show"];
     for (name, said) in [
         ("LANESWEEP_RUN_DT_S", "the variable LANESWEEP_RUN_DT_S is not read: write --config run.dt_s=VALUE"),
         ("LANESWEEP_MINING_CUT_IN_MAX_THW_S", "--config mining.cut_in.max_thw_s=VALUE"),
     ] {
-        let output = run(dir.path(), &[(name, "0.05")], &show);
-        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        let output = run(dir.path(), &[(name, "0.05")], "config show");
+        let text = unbroken(&output.stderr);
         assert!(output.status.success() && text.contains(said), "{text}");
     }
     for name in ["LANESWEEP_CONIFG", "LANESWEEP_CONFIG_FILE"] {
-        let text = refused(dir.path(), &[(name, "a.toml")], &show);
+        let text = refused(dir.path(), &[(name, "a.toml")], "config show");
         assert!(text.contains("did you mean `LANESWEEP_CONFIG`"), "{text}");
     }
     // Variables of others, and of this program's tests, are none of them.
-    let output =
-        run(dir.path(), &[("LANESWEEP_SHARED", "x"), ("LANESWEEP_CHIPS", "1"), ("LANESWEEP_NODE", "7")], &show);
+    let others = [("LANESWEEP_SHARED", "x"), ("LANESWEEP_CHIPS", "1"), ("LANESWEEP_NODE", "7")];
+    let output = run(dir.path(), &others, "config show");
     assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
 }
 
@@ -156,33 +148,30 @@ fn every_record_names_every_setting_with_its_source() {
     let keys: Vec<Key> = Key::all().into_iter().filter(|key| !unset.contains(&key.name.as_str())).collect();
     let line = |key: &Key| format!("{} = {}\n", key.name, changed(key));
     std::fs::write(dir.join("all.toml"), keys.iter().map(line).collect::<String>()).unwrap();
-    let run = |args: &[&str]| good(dir, &[], &[&["-q", "--config", "all.toml"], args].concat());
-    let printed = |args: &[&str]| serde_json::from_str::<Value>(&run(args)).unwrap();
-    let recorded = |record: &str, args: &[&str]| {
-        run(args);
+    let run = |line: &str| good(dir, &[], &format!("-q --config all.toml {line}"));
+    let recorded = |record: &str, line: &str| {
+        run(line);
         json(&dir.join(record))
     };
-    let fit = ["fit", "--parameterizations", "i", "--out", "i.json", "--format", "json"];
+    run("synth data");
+    let fit = run("fit --parameterizations i --out i.json --format json");
+    let sample = "sample i.json --models FSM --thw 1";
     // A preset has its own initial distances and panels.
-    let map = ["map", "lvd", "--preset", "jrc", "--models", "FSM"];
+    let map = "map lvd --preset jrc --models FSM";
     let records = [
-        ("study", recorded("lanesweep-out/run.json", &["study", "--categories", "lvd"])),
-        ("mine", {
-            run(&["synth", "data"]);
-            recorded("s.exposure.json", &["mine", "data", "--out", "s.jsonl"])
-        }),
-        ("fit", printed(&fit)),
-        ("sample", recorded("lanesweep-sample/estimate.json", &["sample", "i.json", "--models", "FSM", "--thw", "1"])),
-        ("map", recorded("lanesweep-map/map.json", &map)),
+        ("study", recorded("lanesweep-out/run.json", "study --categories lvd")),
+        ("mine", recorded("s.exposure.json", "mine data --out s.jsonl")),
+        ("fit", serde_json::from_str(&fit).unwrap()),
+        ("sample", recorded("lanesweep-sample/estimate.json", sample)),
+        ("map", recorded("lanesweep-map/map.json", map)),
     ];
     for (verb, record) in records {
         let settings = record["settings"].as_array().unwrap_or_else(|| panic!("{verb}"));
         assert_eq!(settings.len(), Key::all().len(), "{verb}");
         for (row, key) in (1..).zip(&keys) {
-            let of =
-                settings.iter().find(|of| of["key"] == *key.name).unwrap_or_else(|| panic!("{verb}: {}", key.name));
-            assert_eq!(of["value"], changed(key), "{verb}: {}", key.name);
-            assert_eq!(of["source"], format!("file all.toml, line {row}"), "{verb}: {}", key.name);
+            let of = settings.iter().find(|of| of["key"] == *key.name).unwrap_or(&Value::Null);
+            let source = format!("file all.toml, line {row}").into();
+            assert_eq!((&of["value"], &of["source"]), (&changed(key), &source), "{verb}: {}", key.name);
         }
         assert!(verb == "mine" || verb == "fit" || record["profile"]["frame"]["dt_s"] == 0.05, "{verb}");
     }
@@ -192,13 +181,11 @@ fn every_record_names_every_setting_with_its_source() {
 fn the_estimate_of_a_plan_names_the_options_of_the_plan_and_not_those_of_the_command() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    let config = ["--config", "generator.recordings=2", "--config", "generator.duration_s=100"];
-    let fit = ["-q", "fit", "--parameterizations", "i", "--out", "i.json"];
-    good(dir, &[], &[&fit, &config[..]].concat());
-    let is = ["--estimator", "is", "--samples", "2000", "--models", "FSM", "--thw", "0.6"];
-    let weight = ["--config", "sample.crude_lanes=300000", "--plan-only", "--out", "plan"];
-    good(dir, &[], &[&["-q", "sample", "i.json"], &is[..], &weight].concat());
-    good(dir, &[], &["-q", "sample", "--plan", "plan/plan.json", "--out", "out"]);
+    let few = "--config generator.recordings=2 --config generator.duration_s=100";
+    good(dir, &[], &format!("-q fit --parameterizations i --out i.json {few}"));
+    let is = "sample i.json --estimator is --samples 2000 --models FSM --thw 0.6";
+    good(dir, &[], &format!("-q {is} --config sample.crude_lanes=300000 --plan-only --out plan"));
+    good(dir, &[], "-q sample --plan plan/plan.json --out out");
     let record = json(&dir.join("out/estimate.json"));
     assert!(record["options"].to_string().contains("\"crude\":300000"), "{}", record["options"]);
     let settings = record["settings"].as_array().unwrap();
@@ -211,17 +198,15 @@ fn mining_is_configured_alike_for_mine_and_study() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     std::fs::write(dir.join("a.toml"), "[mining.lvd]\nmin_peak_deceleration_mps2 = 1e6\n").unwrap();
-    good(dir, &[], &["-q", "synth", "data", "--synth-recordings", "2", "--config", "generator.duration_s=120"]);
-    let kept = |args: &[&str]| {
-        let text = good(dir, &[], &[&["-q", "mine", "data", "--kept"], args].concat());
+    good(dir, &[], "-q synth data --synth-recordings 2 --config generator.duration_s=120");
+    let kept = |args: &str| {
+        let text = good(dir, &[], &format!("-q mine data --kept {args}"));
         text.lines().filter(|line| line.contains("_lvd_")).count()
     };
-    assert!(kept(&[]) > 0);
-    assert_eq!(kept(&["--config", "a.toml"]), 0);
-    let default = ["--config", "a.toml", "--config", "mining.lvd.min_peak_deceleration_mps2="];
-    assert_eq!(kept(&default), kept(&[]));
-    let study = ["-q", "study", "data", "--backend", "cpu", "--categories", "cut-in,lvd", "--config", "a.toml"];
-    good(dir, &[], &study);
+    assert!(kept("") > 0);
+    assert_eq!(kept("--config a.toml"), 0);
+    assert_eq!(kept("--config a.toml --config mining.lvd.min_peak_deceleration_mps2="), kept(""));
+    good(dir, &[], "-q study data --backend cpu --categories cut-in,lvd --config a.toml");
     let record = json(&dir.join("lanesweep-out/run.json"));
     assert_eq!(record["mining"]["lvd"]["min_peak_deceleration_mps2"], 1e6);
     let categories = record["categories"].as_array().unwrap();
@@ -245,28 +230,26 @@ fn a_wrong_word_is_answered_with_its_place_and_the_nearest_right_one() {
         ("[run]\nbackend = 3\n", "line 2, `run.backend`: 3", "one of \"auto\", \"cpu\", \"gpu\""),
         ("[run]\nprofile = \"papr\"\n", "a.toml, line 2, `run.profile`", "did you mean `paper`?"),
         ("[run]\ndevice = \"pci:zz\"\n", "a.toml, line 2, `run.device`", "no PCI bus id"),
-        (
-            "[mining.cut_out]\nrequire_slower_lead = 1\n",
-            "line 2, `mining.cut_out.require_slower_lead`",
-            "true or false",
-        ),
+        ("[mining.cut_out]\nrequire_slower_lead = 1\n", "`mining.cut_out.require_slower_lead`", "true or false"),
         ("mining = 3\n", "line 1, `mining`: this is a table, not a key", "write [mining]"),
         ("[score]\nseed = 1\nseed = 2\n", "a.toml, line 3", "duplicate key"),
         ("[score\n", "a.toml, line 1", "lanesweep config init -"),
     ];
     for (text, place, hint) in files {
         std::fs::write(dir.join("a.toml"), text).unwrap();
-        for verb in [&["study"][..], &["config", "show"]] {
-            let said = refused(dir, &[], &[verb, &["--config", "a.toml"]].concat());
+        for verb in ["study", "config show"] {
+            let said = refused(dir, &[], &format!("{verb} --config a.toml"));
             assert!(said.contains(place) && said.contains(hint), "{text:?}: {said}");
         }
     }
-    let said = refused(dir, &[], &["config", "show", "--config", "sample.level=2"]);
-    assert!(said.contains("--config sample.level=2: `2` cannot be used"), "{said}");
-    let said = refused(dir, &[], &["study", "--config", "score.sed=3"]);
-    assert!(said.contains("--config score.sed=3") && said.contains("`score.seed`"), "{said}");
-    let said = refused(dir, &[], &["study", "--config", "score.seed=x"]);
-    assert!(said.contains("--config score.seed=x: `x` cannot be used"), "{said}");
+    for (line, place, hint) in [
+        ("config show --config sample.level=2", "--config sample.level=2: `2` cannot be used", ""),
+        ("study --config score.sed=3", "--config score.sed=3", "`score.seed`"),
+        ("study --config score.seed=x", "--config score.seed=x: `x` cannot be used", ""),
+    ] {
+        let said = refused(dir, &[], line);
+        assert!(said.contains(place) && said.contains(hint), "{line}: {said}");
+    }
     assert_eq!(std::fs::read_dir(dir).unwrap().count(), 1, "nothing was written");
 }
 
@@ -284,16 +267,16 @@ fn what_is_configured_yields_to_a_flag_that_contradicts_it() {
     }
     let [device, gpu, both, small] =
         ["device.toml", "gpu.toml", "both.toml", "small.toml"].map(|file| [("LANESWEEP_CONFIG", file)]);
-    good(dir, &device, &["-q", "study", "--backend", "cpu"]);
-    good(dir, &gpu, &["-q", "study", "--config", "study.reference=true", "--backend", "cpu"]);
-    refused(dir, &device, &["-q", "study"]);
-    let said = refused(dir, &both, &["-q", "study"]);
+    good(dir, &device, "-q study --backend cpu");
+    good(dir, &gpu, "-q study --config study.reference=true --backend cpu");
+    refused(dir, &device, "-q study");
+    let said = refused(dir, &both, "-q study");
     assert!(said.contains("both.toml, line 3, `run.device`: `0` is named") && !said.contains("--backend"), "{said}");
     assert!(said.contains("both.toml, line 2, `run.backend` chooses the CPU"), "{said}");
     // A plan's lanes are decided; what the file of the environment says of them was there when it was made.
-    good(dir, &small, &["-q", "study", "--plan-only", "--out", "run"]);
-    good(dir, &small, &["-q", "study", "--plan", "run/plan.json"]);
-    let said = refused(dir, &small, &["study", "--plan", "run/plan.json", "--config", "score.seed=3"]);
+    good(dir, &small, "-q study --plan-only --out run");
+    good(dir, &small, "-q study --plan run/plan.json");
+    let said = refused(dir, &small, "study --plan run/plan.json --config score.seed=3");
     assert!(said.contains("`score.seed` is decided by the plan"), "{said}");
 }
 
@@ -301,20 +284,19 @@ fn what_is_configured_yields_to_a_flag_that_contradicts_it() {
 fn the_default_file_is_written_once_and_sets_what_is_so_anyway() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    assert!(good(dir, &[], &["config", "init"]).contains("--config lanesweep.toml"));
+    assert!(good(dir, &[], "config init").contains("--config lanesweep.toml"));
     let written = std::fs::read_to_string(dir.join("lanesweep.toml")).unwrap();
-    assert_eq!(written, good(dir, &[], &["config", "init", "-"]));
+    assert_eq!(written, good(dir, &[], "config init -"));
     assert_eq!(written, include_str!("../../configs/default.toml"));
     std::fs::write(dir.join("lanesweep.toml"), "[score]\nseed = 1\n").unwrap();
-    assert!(refused(dir, &[], &["config", "init"]).contains("is not overwritten"));
+    assert!(refused(dir, &[], "config init").contains("is not overwritten"));
     assert_eq!(std::fs::read_to_string(dir.join("lanesweep.toml")).unwrap(), "[score]\nseed = 1\n");
-    assert_eq!(good(dir, &[], &["config", "check", "lanesweep.toml"]).lines().count(), 1);
-    good(dir, &[], &["config", "init", "new/other.toml"]);
+    assert_eq!(good(dir, &[], "config check lanesweep.toml").lines().count(), 1);
+    good(dir, &[], "config init new/other.toml");
     // What is shown as a file sets the same again.
-    let args = ["config", "show", "--format", "toml", "--config", "mining.cut_in.max_thw_s=1.5", "--threads", "1"];
-    let toml = good(dir, &[], &args);
+    let toml = good(dir, &[], "config show --format toml --config mining.cut_in.max_thw_s=1.5 --threads 1");
     std::fs::write(dir.join("again.toml"), &toml).unwrap();
-    assert_eq!(toml, good(dir, &[], &["config", "show", "--format", "toml", "--config", "again.toml"]));
+    assert_eq!(toml, good(dir, &[], "config show --format toml --config again.toml"));
     assert!(
         toml.contains("[run]\nthreads = 1\n") && toml.contains("[mining.cut_in]\nmin_duration_s = 0.1\n"),
         "{toml}"
@@ -324,7 +306,7 @@ fn the_default_file_is_written_once_and_sets_what_is_so_anyway() {
 #[test]
 fn the_schema_has_every_key_with_a_default_in_its_own_range() {
     let dir = tempfile::tempdir().unwrap();
-    let schema: Value = serde_json::from_str(&good(dir.path(), &[], &["config", "schema"])).unwrap();
+    let schema: Value = serde_json::from_str(&good(dir.path(), &[], "config schema")).unwrap();
     let mut leaves = BTreeSet::new();
     walk(&schema, "", &mut |name, leaf| {
         let within = |limit: &str, fits: &dyn Fn(f64, f64) -> bool| {
@@ -338,22 +320,10 @@ fn the_schema_has_every_key_with_a_default_in_its_own_range() {
         assert!(leaf["description"].as_str().is_some_and(|text| !text.contains("[`")), "{name}: {leaf}");
         leaves.insert(name.to_owned());
     });
-    let shown: Value = serde_json::from_str(&good(dir.path(), &[], &["config", "show", "--format", "json"])).unwrap();
+    let shown: Value = serde_json::from_str(&good(dir.path(), &[], "config show --format json")).unwrap();
     let keys = shown.as_array().unwrap().iter().map(|one| one["key"].as_str().unwrap().to_owned());
     assert_eq!(leaves, keys.collect());
     assert_eq!(schema["additionalProperties"], false);
-    // Every profile that ships fits the schema of profiles: its keys are the schema's.
-    let schema: Value = serde_json::from_str(&good(dir.path(), &[], &["config", "schema", "profile"])).unwrap();
-    let mut leaves = BTreeSet::new();
-    walk(&schema, "", &mut |name, _| {
-        leaves.insert(name.to_owned());
-    });
-    let paper: toml::Table = toml::from_str(include_str!("../../configs/profiles/paper.toml")).unwrap();
-    for (table, inner) in &paper {
-        for key in inner.as_table().into_iter().flat_map(|inner| inner.keys()) {
-            assert!(leaves.contains(&format!("{table}.{key}")), "{table}.{key}");
-        }
-    }
 }
 
 /// The part of JSON Schema that [`lanesweep config schema profile`] uses.
@@ -383,7 +353,7 @@ fn fits(value: &Value, schema: &Value, at: &str) {
 #[test]
 fn the_profiles_that_ship_fit_the_schema_of_profiles() {
     let dir = tempfile::tempdir().unwrap();
-    let schema: Value = serde_json::from_str(&good(dir.path(), &[], &["config", "schema", "profile"])).unwrap();
+    let schema: Value = serde_json::from_str(&good(dir.path(), &[], "config schema profile")).unwrap();
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/profiles");
     let mut count = 0;
     for file in std::fs::read_dir(folder).unwrap().flatten() {
@@ -409,13 +379,12 @@ fn walk(schema: &Value, prefix: &str, each: &mut dyn FnMut(&str, &Value)) {
 fn counts_of_flags_are_written_as_in_a_configuration_file() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    let fit = "-q fit --synth-recordings 2 --categories cut-in --parameterizations 2 --out d.json";
-    good(dir, &[], &fit.split(' ').collect::<Vec<_>>());
+    good(dir, &[], "-q fit --synth-recordings 2 --categories cut-in --parameterizations 2 --out d.json");
     for (samples, lanes) in
         [("1000000000", "20,000,000,000 lanes"), ("1e9", "20,000,000,000 lanes"), ("1_000", "20,000 lanes")]
     {
-        let sample = ["-q", "sample", "d.json", "--models", "FSM,RSS", "--plan-only", "--samples", samples];
-        let planned = good(dir, &[], &[&sample[..], &["--out", samples]].concat());
+        let sample = "-q sample d.json --models FSM,RSS --plan-only --samples";
+        let planned = good(dir, &[], &format!("{sample} {samples} --out {samples}"));
         assert!(planned.starts_with(lanes), "{samples}: {planned}");
     }
 }

@@ -312,41 +312,18 @@ fn missing_values_gaps_and_repeated_rows_are_said() {
 /// The headers of the formats, as their publishers describe them.
 #[test]
 fn every_format_is_detected_by_its_header() {
-    let headers = [
-        (
-            "exid",
-            "07_tracks.csv",
-            "recordingId,trackId,frame,trackLifetime,xCenter,yCenter,heading,width,length,xVelocity,yVelocity,xAcceleration,yAcceleration,lonVelocity,latVelocity,lonAcceleration,latAcceleration",
-        ),
-        (
-            "sumo-fcd",
-            "fcd.csv",
-            "timestep_time;vehicle_id;vehicle_x;vehicle_y;vehicle_angle;vehicle_type;vehicle_speed;vehicle_pos;vehicle_lane;vehicle_edge;vehicle_slope",
-        ),
-        (
-            "mitra",
-            "T1_D1.csv",
-            "Vehicle_ID,Vehicle_type,Time [s],x [m],y [m],Speed [km/h],Lon. Acc. [ms-2],Lat. Acc. [ms-2],Angle [rad],Vehicle_length [m],Vehicle_width [m],Lane,Leader_ID,Follower_ID,Left_Leader_ID,Left_Follower_ID,Right_Leader_ID,Right_Follower_ID",
-        ),
-        (
-            "tgsim",
-            "i294.csv",
-            "id,time,xloc-kf,yloc-kf,lane-kf,speed-kf,acceleration-kf,length-smoothed,width-smoothed,type-most-common,av,run-index",
-        ),
-        (
-            "ngsim",
-            "us101.csv",
-            "Vehicle_ID,Frame_ID,Total_Frames,Global_Time,Local_X,Local_Y,Global_X,Global_Y,v_length,v_Width,v_Class,v_Vel,v_Acc,Lane_ID,Preceding,Following,Space_Headway,Time_Headway,Location",
-        ),
-        (
-            "citysim",
-            "free.csv",
-            "frameNum,carId,carCenterX,carCenterY,headX,headY,tailX,tailY,carCenterXft,carCenterYft,speed,course,heading,laneId",
-        ),
-        ("generic", "x.csv", "track_id,t,x,y,class"),
-    ];
+    let headers = "\
+exid|07_tracks.csv|recordingId,trackId,frame,trackLifetime,xCenter,yCenter,heading,width,length,xVelocity,yVelocity,xAcceleration,yAcceleration,lonVelocity,latVelocity,lonAcceleration,latAcceleration
+sumo-fcd|fcd.csv|timestep_time;vehicle_id;vehicle_x;vehicle_y;vehicle_angle;vehicle_type;vehicle_speed;vehicle_pos;vehicle_lane;vehicle_edge;vehicle_slope
+mitra|T1_D1.csv|Vehicle_ID,Vehicle_type,Time [s],x [m],y [m],Speed [km/h],Lon. Acc. [ms-2],Lat. Acc. [ms-2],Angle [rad],Vehicle_length [m],Vehicle_width [m],Lane,Leader_ID,Follower_ID,Left_Leader_ID,Left_Follower_ID,Right_Leader_ID,Right_Follower_ID
+tgsim|i294.csv|id,time,xloc-kf,yloc-kf,lane-kf,speed-kf,acceleration-kf,length-smoothed,width-smoothed,type-most-common,av,run-index
+ngsim|us101.csv|Vehicle_ID,Frame_ID,Total_Frames,Global_Time,Local_X,Local_Y,Global_X,Global_Y,v_length,v_Width,v_Class,v_Vel,v_Acc,Lane_ID,Preceding,Following,Space_Headway,Time_Headway,Location
+citysim|free.csv|frameNum,carId,carCenterX,carCenterY,headX,headY,tailX,tailY,carCenterXft,carCenterYft,speed,course,heading,laneId
+generic|x.csv|track_id,t,x,y,class
+";
     let dir = tempfile::tempdir().unwrap();
-    for (name, file, header) in headers {
+    for line in headers.lines() {
+        let [name, file, header] = line.split('|').collect::<Vec<_>>()[..] else { panic!("{line}") };
         let path = dir.path().join(file);
         std::fs::write(&path, format!("{header}\n")).unwrap();
         let found = tracks::detect(&path).unwrap();
