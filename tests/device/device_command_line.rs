@@ -1,28 +1,10 @@
 //! `verify`, `--backend` and `--device` as their users type them.
 
-use crate::common;
-
 use std::path::Path;
-use std::process::Output;
 
+use crate::common;
 use crate::common::device::software_device;
-use assert_cmd::Command;
-
-fn lanesweep(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_lanesweep")).env("NO_COLOR", "1").args(args).output().unwrap()
-}
-
-fn code(output: &Output) -> i32 {
-    output.status.code().expect("the program ended by itself")
-}
-
-fn stdout(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stdout).into_owned()
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).split_whitespace().collect::<Vec<_>>().join(" ")
-}
+use crate::common::program::{json, ran, refused, said};
 
 /// `--device` with the index of the software device.
 fn device() -> Option<String> {
@@ -34,28 +16,23 @@ fn has_gpu() -> bool {
     lanesweep::engine::gpu::Adapters::enumerate().cards().iter().any(|card| card.is_real())
 }
 
-const SMALL: [&str; 4] = ["--synth-recordings", "1", "--config", "generator.duration_s=120"];
+const SMALL: &str = "--synth-recordings 1 --config generator.duration_s=120";
 
 #[test]
 fn a_study_on_a_device_writes_the_same_files_as_on_the_cpu() {
     let Some(device) = device() else { return };
     let dir = tempfile::tempdir().unwrap();
-    let run = |name: &str, backend: &[&str]| {
-        let out = dir.path().join(name);
-        let lanes = out.join("lanes.csv");
-        let (out, lanes) = (out.to_str().unwrap(), lanes.to_str().unwrap());
-        let output = lanesweep(&[&["-q", "study", "--out", out, "--rows", lanes], &SMALL[..], backend].concat());
-        assert_eq!(code(&output), 0, "{}", stderr(&output));
-        stdout(&output)
+    let study = |out: &str, backend: &str| {
+        ran(dir.path(), &format!("-q study --out {out} --rows {out}/lanes.csv {SMALL} {backend}"))
     };
-    let on_cpu = run("cpu", &["--backend", "cpu"]);
-    assert!(on_cpu == run("device", &["--backend", "gpu", "--device", &device]), "the tables differ");
+    let on_cpu = study("cpu", "--backend cpu");
+    assert!(on_cpu == study("device", &format!("--backend gpu --device {device}")), "the tables differ");
     let mut files = 0;
     for entry in std::fs::read_dir(dir.path().join("cpu")).unwrap() {
         let name = entry.unwrap().file_name();
         let read = |folder: &str| std::fs::read(dir.path().join(folder).join(&name)).unwrap();
         if name == "run.json" {
-            let record: serde_json::Value = serde_json::from_slice(&read("device")).unwrap();
+            let record = json(&dir.path().join("device/run.json"));
             assert_eq!(record["device"]["exact_path"], true);
             assert_eq!(record["sweep"]["redone_lanes"], 0);
             let (lanes, rechecked) = (record["lanes"].as_u64(), record["sweep"]["rechecked_lanes"].as_u64());
@@ -76,10 +53,8 @@ fn a_study_on_a_device_writes_the_same_files_as_on_the_cpu() {
 #[test]
 fn verify_passes_on_the_software_device_and_says_what_it_compared() {
     let Some(device) = device() else { return };
-    let args = ["-q", "verify", "--device", &device, "--random-lanes", "400", "--config", "verify.threshold_units=2"];
-    let output = lanesweep(&[&args[..], &SMALL].concat());
-    assert_eq!(code(&output), 0, "{}", stderr(&output));
-    let text = stdout(&output);
+    let sets = "--random-lanes 400 --config verify.threshold_units=2";
+    let text = ran(Path::new("."), &format!("-q verify --device {device} {sets} {SMALL}"));
     for part in ["Under test: GPU", "Random lanes", "Lanes on thresholds", "Study", "every word equals the CPU's"] {
         assert!(text.contains(part), "{part}: {text}");
     }
@@ -90,21 +65,16 @@ fn verify_passes_on_the_software_device_and_says_what_it_compared() {
 fn a_lane_can_be_run_again_from_its_key() {
     let Some(device) = device() else { return };
     let key = "random-cut-out-seed157-0000003/mixed/12m/FSM";
-    let output = lanesweep(&["verify", "--device", &device, "--random-lanes", "400", "--lane", key]);
-    assert_eq!(code(&output), 0, "{}", stderr(&output));
-    let text = stdout(&output);
+    let verify = format!("verify --device {device} --random-lanes 400 --lane");
+    let text = ran(Path::new("."), &format!("{verify} {key}"));
     assert!(text.contains(key) && text.contains("min_ttc") && text.contains("f64 reference"), "{text}");
-    let unknown = lanesweep(&["verify", "--device", &device, "--random-lanes", "400", "--lane", "random-nothing"]);
-    assert_eq!(code(&unknown), 2);
-    assert!(stderr(&unknown).contains("no lane `random-nothing`"), "{}", stderr(&unknown));
+    refused(Path::new("."), &format!("{verify} random-nothing"), 2, "no lane `random-nothing`");
 }
 
 #[test]
 fn the_cpu_backend_can_be_verified_without_any_device() {
-    let args = ["-q", "verify", "--backend", "cpu", "--random-lanes", "400", "--config", "verify.threshold_units=1"];
-    let output = lanesweep(&[&args[..], &SMALL].concat());
-    assert_eq!(code(&output), 0, "{}", stderr(&output));
-    assert!(stdout(&output).contains("Under test: CPU"));
+    let verify = "-q verify --backend cpu --random-lanes 400 --config verify.threshold_units=1";
+    assert!(ran(Path::new("."), &format!("{verify} {SMALL}")).contains("Under test: CPU"));
 }
 
 #[test]
@@ -113,40 +83,34 @@ fn a_gpu_that_is_not_there_has_its_own_exit_code_and_nothing_is_written() {
         return;
     }
     let dir = tempfile::tempdir().unwrap();
-    let out = dir.path().join("out");
-    let output = lanesweep(&[&["study", "--backend", "gpu", "--out", out.to_str().unwrap()], &SMALL[..]].concat());
-    assert_eq!(code(&output), 7, "{}", stderr(&output));
-    assert!(stderr(&output).contains("no GPU") && stderr(&output).contains("--backend cpu"), "{}", stderr(&output));
-    assert!(!Path::new(&out).exists());
-    let verify = lanesweep(&["verify"]);
-    let said = stderr(&verify);
-    assert_eq!(code(&verify), 7, "{said}");
-    let (problem, help) = said.split_once("help:").unwrap();
-    assert!(!problem.contains("--backend") && problem.contains("compares a device with the CPU"), "{said}");
-    assert!(help.contains("--device") && help.contains("--backend cpu compares"), "{said}");
+    let (code, text) = said(dir.path(), &format!("study --backend gpu --out out {SMALL}"));
+    assert!(code == 7 && text.contains("no GPU") && text.contains("--backend cpu"), "{code} {text}");
+    assert!(!dir.path().join("out").exists());
+    let (code, text) = said(dir.path(), "verify");
+    assert_eq!(code, 7, "{text}");
+    let (problem, help) = text.split_once("help:").unwrap();
+    assert!(!problem.contains("--backend") && problem.contains("compares a device with the CPU"), "{text}");
+    assert!(help.contains("--device") && help.contains("--backend cpu compares"), "{text}");
 }
 
 #[test]
 fn contradicting_flags_are_answered_with_what_to_write() {
-    let cases: [(&[&str], &str); 6] = [
-        (&["study", "--backend", "cpu", "--device", "0"], "--device"),
-        (&["study", "--config", "study.reference=true", "--backend", "gpu"], "binary64"),
-        (&["study", "--config", "study.reference=true", "--device", "llvmpipe"], "binary64"),
-        (&["study", "--backend", "tpu"], "tpu"),
-        (&["study", "--device", "no such device"], "no such device"),
-        (&["verify", "--backend", "cpu", "--random-lanes", "0"], "--random-lanes"),
-    ];
-    for (args, part) in cases {
-        let output = lanesweep(args);
-        assert_eq!(code(&output), 2, "{args:?}: {}", stderr(&output));
-        assert!(stderr(&output).contains(part), "{args:?}: {}", stderr(&output));
+    for (line, hint) in [
+        ("study --backend cpu --device 0", "--device"),
+        ("study --config study.reference=true --backend gpu", "binary64"),
+        ("study --config study.reference=true --device llvmpipe", "binary64"),
+        ("study --backend tpu", "tpu"),
+        ("study --device no-such-device", "no-such-device"),
+        ("verify --backend cpu --random-lanes 0", "--random-lanes"),
+    ] {
+        refused(Path::new("."), line, 2, hint);
     }
 }
 
 #[test]
 fn recordings_without_a_scenario_are_an_input_that_cannot_be_verified() {
-    let args = ["-q", "verify", "--backend", "cpu", "--random-lanes", "40", "--config", "verify.threshold_units=1"];
-    let output = lanesweep(&[&args[..], &["--synth-recordings", "1", "--config", "generator.duration_s=1"]].concat());
-    assert_eq!(code(&output), 3, "{}", stderr(&output));
-    assert!(stderr(&output).contains("no scenario to simulate"), "{}", stderr(&output));
+    let sets = "--random-lanes 40 --config verify.threshold_units=1";
+    let nothing = "--synth-recordings 1 --config generator.duration_s=1";
+    let (code, text) = said(Path::new("."), &format!("-q verify --backend cpu {sets} {nothing}"));
+    assert!(code == 3 && text.contains("no scenario to simulate"), "{code} {text}");
 }

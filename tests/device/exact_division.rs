@@ -12,12 +12,8 @@
 //! The guess may lie up to three units in the last place of the true quotient of the mantissas off: Vulkan allows
 //! 2.5. Units below 1 are 2⁻²⁴ and above 2⁻²³; a guess is moved by the unit of the true quotient, also across 1.
 
-// SPIR-V is handed to the driver unseen, as src/engine/gpu/device.rs does with the shaders of this crate.
-#![allow(unsafe_code, clippy::undocumented_unsafe_blocks)]
-
-use crate::common::device::software_device;
+use crate::kernel::{Kernel, Path, WORKGROUP};
 use bytemuck::{Pod, Zeroable};
-use lanesweep::engine::gpu::{exact_spirv, shader::ENTRY};
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 
@@ -29,9 +25,9 @@ struct Question {
     guesses: array<u32, 7>,
 }
 
-@group(0) @binding(0) var<storage, read> questions: array<Question>;
+@group(0) @binding(1) var<storage, read> questions: array<Question>;
 // The quotient from the device's own guess, then one from each guess of the host.
-@group(0) @binding(1) var<storage, read_write> answers: array<array<u32, 8>>;
+@group(0) @binding(0) var<storage, read_write> answers: array<array<u32, 8>>;
 
 @compute @workgroup_size(64)
 fn lanes(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -44,7 +40,6 @@ fn lanes(@builtin(global_invocation_id) id: vec3<u32>) {
     }
 }
 ";
-const WORKGROUP: u32 = 64;
 /// Pairs of one dispatch.
 const BATCH: usize = 1 << 18;
 const MANTISSA: u32 = 0x007f_ffff;
@@ -55,121 +50,6 @@ struct Question {
     a_bits: u32,
     b_bits: u32,
     guesses: [u32; 7],
-}
-
-/// How the kernel reaches the driver.
-#[derive(Clone, Copy)]
-enum Path {
-    /// As SPIR-V without contraction: the way of the sweeps.
-    Exact,
-    /// As WGSL, translated by wgpu: the way on other interfaces.
-    Plain,
-}
-
-/// The kernel on the software Vulkan.
-struct Divider {
-    device: wgpu::Device,
-    queue: wgpu::Queue,
-    pipeline: wgpu::ComputePipeline,
-    group: wgpu::BindGroup,
-    questions: wgpu::Buffer,
-    answers: wgpu::Buffer,
-    readback: wgpu::Buffer,
-}
-
-impl Divider {
-    fn new(source: &str, path: Path) -> Option<Divider> {
-        let (adapters, index) = software_device()?;
-        let adapter = adapters.take(index).unwrap();
-        let is_exact = matches!(path, Path::Exact);
-        assert!(adapters.cards()[index].exact_path || !is_exact, "the software Vulkan has no exact path");
-        let mut required_features = wgpu::Features::empty();
-        required_features.set(wgpu::Features::PASSTHROUGH_SHADERS, is_exact);
-        let descriptor =
-            wgpu::DeviceDescriptor { required_features, required_limits: adapter.limits(), ..Default::default() };
-        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).unwrap();
-        let module = match path {
-            Path::Exact => {
-                let words = exact_spirv(source, ENTRY, &[], false).unwrap();
-                let entry = wgpu::PassthroughShaderEntryPoint { name: ENTRY.into(), workgroup_size: (WORKGROUP, 1, 1) };
-                // SAFETY: valid SPIR-V of naga, whose bindings are those of `layout`.
-                unsafe {
-                    device.create_shader_module_passthrough(wgpu::ShaderModuleDescriptorPassthrough {
-                        label: None,
-                        entry_points: vec![entry].into(),
-                        spirv: Some(words.into()),
-                        ..Default::default()
-                    })
-                }
-            }
-            Path::Plain => device.create_shader_module(wgpu::ShaderModuleDescriptor {
-                label: None,
-                source: wgpu::ShaderSource::Wgsl(source.into()),
-            }),
-        };
-        let entries = [(0, true), (1, false)].map(|(binding, read_only)| wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: wgpu::ShaderStages::COMPUTE,
-            ty: wgpu::BindingType::Buffer {
-                ty: wgpu::BufferBindingType::Storage { read_only },
-                has_dynamic_offset: false,
-                min_binding_size: None,
-            },
-            count: None,
-        });
-        let layout =
-            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &entries });
-        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: None,
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
-        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: None,
-            layout: Some(&pipeline_layout),
-            module: &module,
-            entry_point: Some(ENTRY),
-            compilation_options: Default::default(),
-            cache: None,
-        });
-        let buffer = |words: usize, usage| {
-            let size = (BATCH * words * 4) as u64;
-            device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false })
-        };
-        use wgpu::BufferUsages as Usage;
-        let questions = buffer(9, Usage::STORAGE | Usage::COPY_DST);
-        let answers = buffer(8, Usage::STORAGE | Usage::COPY_SRC);
-        let readback = buffer(8, Usage::MAP_READ | Usage::COPY_DST);
-        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: None,
-            layout: &layout,
-            entries: &[
-                wgpu::BindGroupEntry { binding: 0, resource: questions.as_entire_binding() },
-                wgpu::BindGroupEntry { binding: 1, resource: answers.as_entire_binding() },
-            ],
-        });
-        Some(Divider { device, queue, pipeline, group, questions, answers, readback })
-    }
-
-    /// Answers of one whole batch.
-    fn divide(&self, questions: &[Question]) -> Vec<[u32; 8]> {
-        assert_eq!(questions.len(), BATCH);
-        self.queue.write_buffer(&self.questions, 0, bytemuck::cast_slice(questions));
-        let mut encoder = self.device.create_command_encoder(&Default::default());
-        {
-            let mut pass = encoder.begin_compute_pass(&Default::default());
-            pass.set_pipeline(&self.pipeline);
-            pass.set_bind_group(0, &self.group, &[]);
-            pass.dispatch_workgroups(BATCH as u32 / WORKGROUP, 1, 1);
-        }
-        encoder.copy_buffer_to_buffer(&self.answers, 0, &self.readback, 0, self.readback.size());
-        self.queue.submit([encoder.finish()]);
-        self.readback.map_async(wgpu::MapMode::Read, .., |mapped| mapped.unwrap());
-        self.device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
-        let answers = bytemuck::pod_collect_to_vec(&self.readback.get_mapped_range(..).unwrap());
-        self.readback.unmap();
-        answers
-    }
 }
 
 /// Pairs to divide, the same in every run.
@@ -284,16 +164,17 @@ struct Seen {
     first: Option<String>,
 }
 
-fn compare(divider: &Divider, batches: usize) -> Seen {
+fn compare(divider: &Kernel, batches: usize) -> Seen {
     let mut pairs = Pairs::new();
     let mut seen = Seen::default();
     for _ in 0..batches {
         let questions: Vec<Question> = (0..BATCH).map(|_| pairs.question()).collect();
-        for (question, answers) in questions.iter().zip(divider.divide(&questions)) {
+        let answers = divider.run(&[bytemuck::cast_slice(&questions)], BATCH as u32 / WORKGROUP, 8 * BATCH);
+        for (question, answers) in questions.iter().zip(answers.chunks_exact(8)) {
             let expected = promised(question.a_bits, question.b_bits);
             seen.infinite += usize::from(expected & 0x7fff_ffff == f32::INFINITY.to_bits());
             seen.zero += usize::from(expected & 0x7fff_ffff == 0);
-            for (way, answer) in answers.into_iter().enumerate() {
+            for (way, &answer) in answers.iter().enumerate() {
                 if answer != expected {
                     seen.wrong[way] += 1;
                     seen.first.get_or_insert_with(|| {
@@ -310,7 +191,7 @@ fn compare(divider: &Divider, batches: usize) -> Seen {
 }
 
 fn assert_correct(path: Path, pairs: usize) {
-    let Some(divider) = Divider::new(&format!("{EXACT}{KERNEL}"), path) else { return };
+    let Some(divider) = Kernel::new(&format!("{EXACT}{KERNEL}"), 1, path) else { return };
     let seen = compare(&divider, pairs.div_ceil(BATCH));
     assert_eq!(seen.wrong, [0; 8], "{:?}", seen.first);
     // The ends of the range were reached.
@@ -347,7 +228,7 @@ fn a_defect_of_the_correction_is_seen() {
     ] {
         assert!(EXACT.contains(right), "{right}");
         let source = format!("{}{KERNEL}", EXACT.replace(right, wrong));
-        let Some(divider) = Divider::new(&source, Path::Exact) else { return };
+        let Some(divider) = Kernel::new(&source, 1, Path::Exact) else { return };
         let seen = compare(&divider, 1);
         assert!(seen.wrong.iter().sum::<usize>() > 0, "{right} became {wrong}, and nothing was seen");
     }

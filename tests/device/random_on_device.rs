@@ -2,9 +2,6 @@
 //! the software Vulkan, for a million indices in eight dimensions, and for the words at which the table of normal
 //! deviates goes from one cubic to the next.
 
-// SPIR-V is handed to the driver unseen, as src/engine/gpu/device.rs does with the shaders of this crate.
-#![allow(unsafe_code, clippy::undocumented_unsafe_blocks)]
-
 use crate::kernel::{Kernel, Path, WORKGROUP};
 use lanesweep::engine::gpu::shader::RANDOM;
 use lanesweep::stats::random::{AliasTable, Sobol, Stream, choose, normal_table, standard_normal, unit_uniform};

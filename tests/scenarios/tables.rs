@@ -2,8 +2,8 @@
 //! make themselves is read, or refused with file, row and column.
 #![cfg(feature = "parquet")]
 
+use crate::common::program::{ran, refused, said};
 use crate::common::tables::made;
-use crate::common::tables::run;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -17,7 +17,6 @@ use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 use made::{Read, read};
 use proptest::prelude::*;
-use run::{lanesweep, said};
 
 fn synthetic() -> Vec<Scenario> {
     let options = GeneratorOptions { recordings: 2, duration_s: 120.0, ..GeneratorOptions::default() };
@@ -89,15 +88,13 @@ proptest! {
 fn a_study_gives_the_same_bytes_from_parquet_and_from_json_lines() {
     let dir = tempfile::tempdir().unwrap();
     let at = dir.path();
-    lanesweep(at, &["-q", "synth", "rec", "--synth-recordings", "3"]);
-    lanesweep(at, &["-q", "mine", "rec", "--out", "s.jsonl"]);
-    lanesweep(at, &["-q", "mine", "rec", "--out", "s.parquet"]);
-    let study = ["-q", "study", "--backend", "cpu", "--config", "study.keep_plan=never"];
-    for (file, out, threads) in [("s.jsonl", "a", "2"), ("s.parquet", "b", "1")] {
+    ran(at, "-q synth rec --synth-recordings 3");
+    ran(at, "-q mine rec --out s.jsonl");
+    ran(at, "-q mine rec --out s.parquet");
+    let study = "-q study --backend cpu --config study.keep_plan=never";
+    for of in ["--scenarios s.jsonl --threads 2 --out a", "--scenarios s.parquet --threads 1 --out b"] {
         for ending in ["csv", "parquet", "jsonl"] {
-            let lanes = format!("{out}.{ending}");
-            let args = ["--scenarios", file, "--out", out, "--threads", threads, "--rows", &lanes];
-            lanesweep(at, &[&study[..], &args].concat());
+            ran(at, &format!("{study} {of} --rows {}.{ending}", &of[of.len() - 1..]));
         }
     }
     let bytes = |name: &str| std::fs::read(at.join(name)).unwrap();
@@ -115,9 +112,7 @@ fn a_study_gives_the_same_bytes_from_parquet_and_from_json_lines() {
     assert_eq!(scenarios.key_values["lanesweep.synthetic"], "true");
     // A density of the same scenarios, of either file: its exposure stands beside each.
     for file in ["s.jsonl", "s.parquet"] {
-        let name = format!("{file}.json");
-        let fit = ["-q", "fit", "--scenarios", file, "--categories", "lvd", "--parameterizations", "i", "--out", &name];
-        lanesweep(at, &fit);
+        ran(at, &format!("-q fit --scenarios {file} --categories lvd --parameterizations i --out {file}.json"));
     }
 }
 
@@ -125,7 +120,7 @@ fn a_study_gives_the_same_bytes_from_parquet_and_from_json_lines() {
 fn what_only_has_the_name_of_a_parquet_file_is_refused() {
     let dir = tempfile::tempdir().unwrap();
     std::fs::write(dir.path().join("density.parquet"), "{\"parameterization\": 2}\n").unwrap();
-    let (code, text) = said(dir.path(), &["study", "--scenarios", "density.parquet"]);
+    let (code, text) = said(dir.path(), "study --scenarios density.parquet");
     assert_eq!(code, 3);
     assert!(text.contains("density.parquet: not a Parquet file that can be read"), "{text}");
     assert!(text.contains("help: write the file again, or use JSON Lines or CSV"), "{text}");
@@ -141,8 +136,8 @@ fn sampled_rows_are_the_same_in_every_format() {
     let id = Parameterization::find(Category::Lvd, "i").unwrap();
     write_density(&at.join("d.json"), &DensityModel::fit(id, &lvd, &facts, &options).unwrap().model).unwrap();
     for (name, threads) in [("r.csv", "2"), ("r.jsonl", "2"), ("r.parquet", "2"), ("again.parquet", "1")] {
-        let args = ["-q", "sample", "d.json", "--samples", "300", "--thw", "0.6,1.2", "--backend", "cpu"];
-        lanesweep(at, &[&args[..], &["--rows", name, "--threads", threads]].concat());
+        let sample = "-q sample d.json --samples 300 --thw 0.6,1.2 --backend cpu";
+        ran(at, &format!("{sample} --rows {name} --threads {threads}"));
     }
     let parquet = read(&at.join("r.parquet"));
     assert_same_rows(&at.join("r.csv"), &parquet);
@@ -219,16 +214,14 @@ fn check_facts(table: &Read, kind: &str, has_lanes: bool) {
 #[test]
 fn an_ending_that_is_unknown_is_answered_with_the_known_ones_before_any_work() {
     let dir = tempfile::tempdir().unwrap();
-    let cases: [(&[&str], &str); 4] = [
-        (&["study", "--rows", "lanes.xlsx"], ".csv, .jsonl or .parquet"),
-        (&["mine", "rec", "--out", "s.csv"], ".jsonl or .parquet"),
-        (&["study", "--scenarios", "s.xml"], ".jsonl, .parquet or .csv"),
-        (&["simulate", "--table", "cases.jsonl"], ".csv or .parquet"),
-    ];
-    lanesweep(dir.path(), &["-q", "synth", "rec", "--synth-recordings", "1", "--config", "generator.duration_s=60"]);
-    for (args, expected) in cases {
-        let (code, text) = said(dir.path(), args);
-        assert!(code == 2 && text.contains(expected), "{args:?}: {code}, {text}");
+    ran(dir.path(), "-q synth rec --synth-recordings 1 --config generator.duration_s=60");
+    for (line, hint) in [
+        ("study --rows lanes.xlsx", ".csv, .jsonl or .parquet"),
+        ("mine rec --out s.csv", ".jsonl or .parquet"),
+        ("study --scenarios s.xml", ".jsonl, .parquet or .csv"),
+        ("simulate --table cases.jsonl", ".csv or .parquet"),
+    ] {
+        refused(dir.path(), line, 2, hint);
     }
 }
 
@@ -236,8 +229,7 @@ fn an_ending_that_is_unknown_is_answered_with_the_known_ones_before_any_work() {
 fn a_lane_table_must_not_replace_the_scenarios_it_is_of() {
     let dir = tempfile::tempdir().unwrap();
     write_scenarios(&dir.path().join("s.parquet"), &synthetic()).unwrap();
-    let (code, text) = said(dir.path(), &["study", "--scenarios", "s.parquet", "--rows", "s.parquet"]);
-    assert!(code == 2 && text.contains("would be overwritten"), "{text}");
+    refused(dir.path(), "study --scenarios s.parquet --rows s.parquet", 2, "would be overwritten");
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! Tables of scenarios and cases that users make: what is read of them, and what is said of those that cannot be read.
 #![cfg(feature = "parquet")]
 
+use crate::common::program::{json, ran, refused, said};
 use crate::common::tables::made;
-use crate::common::tables::run;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -11,7 +11,6 @@ use arrow_array::{ArrayRef, BooleanArray, Date32Array, Float64Array, Int32Array,
 use arrow_schema::{DataType, Field};
 use lanesweep::scenario::{Category, Scenario, Side, read_scenarios};
 use parquet::basic::Compression;
-use run::{lanesweep, said};
 
 fn file(dir: &Path, name: &str, content: &str) -> PathBuf {
     let path = dir.join(name);
@@ -49,9 +48,8 @@ fn a_table_of_tracks_is_recognised_where_scenarios_are_expected() {
         assert!(help.contains("`mine`") && help.contains("folder of the recording"), "{help}");
     }
     let dir = tempfile::tempdir().unwrap();
-    let path = file(dir.path(), "01_tracks.csv", highd);
-    let (code, text) = said(dir.path(), &["study", "--scenarios", path.to_str().unwrap()]);
-    assert!(code == 3 && text.contains("this is a table of tracks"), "{code}: {text}");
+    file(dir.path(), "01_tracks.csv", highd);
+    refused(dir.path(), "study --scenarios 01_tracks.csv", 3, "this is a table of tracks");
     // Places beside the series of a scenario make no recording of it.
     let lines = INSTANTS.lines().zip(["x,y", "1,2", "1,2", "1,2", "1,2", "1,2"]);
     let with_places: String = lines.map(|(line, places)| format!("{line},{places}\n")).collect();
@@ -85,8 +83,7 @@ fn a_cut_in_that_moves_away_or_stands_on_the_other_side_is_told_by_name() {
     let dir = tempfile::tempdir().unwrap();
     let warned = |name: &str, content: &str| {
         file(dir.path(), name, content);
-        let (code, said) =
-            said(dir.path(), &["study", "--scenarios", name, "--plan-only", "--out", &format!("of-{name}")]);
+        let (code, said) = said(dir.path(), &format!("study --scenarios {name} --plan-only --out of-{name}"));
         assert_eq!(code, 0, "{said}");
         said
     };
@@ -103,12 +100,7 @@ fn a_cut_in_that_moves_away_or_stands_on_the_other_side_is_told_by_name() {
 fn what_is_wrong_with_a_row_per_instant_is_told_with_line_scenario_and_column() {
     let cases = [
         ("10.08,106", "10.20,106", "s.csv, line 4, column `time_s`, scenario a", "they must be equal"),
-        (
-            "a,cut-in,10.04,107,4.5",
-            "a,cut-in,10.04,107,4.6",
-            "line 3, column `ego_length_m`, scenario a",
-            "is 4.6, but 4.5",
-        ),
+        ("10.04,107,4.5", "10.04,107,4.6", "line 3, column `ego_length_m`, scenario a", "is 4.6, but 4.5"),
         ("72,3.4", "fast,3.4", "line 3, column `target_speed_kmh`, scenario a", "expected a number"),
         ("10.04", "soon", "line 3, column `time_s`", "expected a time in seconds"),
         ("Right,4.2", "up,4.2", "line 5, column `side`, scenario b", "\"left\", \"right\""),
@@ -149,6 +141,17 @@ a,cut-in,FSM,108,20,1.2,,1.0,,,,,,
 c,cut-out,FSM,108,,1.2,,1.0,,,40,36,4,
 ";
 
+/// The numbers of a series but for its last row.
+fn before_end(series: &str) -> Vec<f64> {
+    let steps: Vec<&str> = series.lines().skip(1).collect();
+    let before_end = &steps[..steps.len() - 1];
+    before_end.iter().flat_map(|line| line.split(',')).filter_map(|field| field.parse().ok()).collect()
+}
+
+fn near((a, b): (&f64, &f64)) -> bool {
+    a == b || (a - b).abs() <= 1e-6 * (1.0 + a.abs())
+}
+
 #[test]
 fn parameters_make_the_scenarios_that_simulate_runs() {
     let read = of("p.csv", CASES).unwrap();
@@ -165,20 +168,14 @@ fn parameters_make_the_scenarios_that_simulate_runs() {
     file(dir.path(), "p.csv", CASES);
     // The run of a scenario's recorded variant is the run of its row.
     for (row, lane) in [("1", "a/S/1.2s/FSM"), ("2", "row-2/S/30m/RSS"), ("3", "c/S/1.2s/FSM")] {
-        let by_row = lanesweep(dir.path(), &["simulate", "--table", "p.csv", "--row", row]);
-        let by_lane = lanesweep(dir.path(), &["simulate", "--scenarios", "p.csv", "--lane", lane]);
+        let by_row = ran(dir.path(), &format!("simulate --table p.csv --row {row}"));
+        let by_lane = ran(dir.path(), &format!("simulate --scenarios p.csv --lane {lane}"));
         assert!(by_row.lines().count() > 20);
-        let numbers = |text: &str| -> Vec<f64> {
-            let steps: Vec<&str> = text.lines().skip(1).collect();
-            let before_end = &steps[..steps.len() - 1];
-            before_end.iter().flat_map(|line| line.split(',')).filter_map(|field| field.parse().ok()).collect()
-        };
-        let (x, y) = (numbers(&by_row), numbers(&by_lane));
-        let near = |(a, b): (&f64, &f64)| a == b || (a - b).abs() <= 1e-6 * (1.0 + a.abs());
+        let (x, y) = (before_end(&by_row), before_end(&by_lane));
         let lines = x.len().min(y.len());
         assert!(lines > 200 && x.iter().zip(&y).take(lines).all(near), "{lane}:\n{by_row}\n{by_lane}");
     }
-    let study = lanesweep(dir.path(), &["-q", "study", "--scenarios", "p.csv", "--out", "out", "--backend", "cpu"]);
+    let study = ran(dir.path(), "-q study --scenarios p.csv --out out --backend cpu");
     assert!(study.contains("cut-in"), "{study}");
 }
 
@@ -190,13 +187,7 @@ fn what_is_wrong_with_parameters_is_told_with_line_and_column() {
         ("lateral_speed", "lateral_speed_ms", "column `lateral_speed_ms`", "milliseconds", "`lateral_speed_mps`"),
         ("cut-in,FSM", "cutin,FSM", "line 2, column `category`", "no category `cutin`", "use cut-in, cut-out or lvd"),
         ("FSM,108,20", "FSM,,20", "line 2, column `ego_speed_kmh`", "missing", "such as 60km/h"),
-        (
-            "1.2,,1.0,,,,",
-            "1.2,8,1.0,,,,",
-            "line 2, column `thw`",
-            "both gap and time headway are given",
-            "leave one of the two empty",
-        ),
+        ("1.2,,1.0", "1.2,8,1.0", "line 2, column `thw`", "both gap and time headway", "leave one of the two empty"),
         ("-6,0", "-6,40m/s", "line 3, column `end_speed`", "cannot be reached", "sign"),
         ("36,4,", "36,2000,", "line 4, column `duration_s`", "2000 cannot be used", "at most 120"),
         ("108,20,", "108,fast,", "line 2, column `speed_mps`", "is \"fast\"", "60km/h"),
@@ -222,38 +213,29 @@ fn what_is_wrong_with_parameters_is_told_with_line_and_column() {
 #[test]
 fn a_row_is_the_same_case_in_every_verb_and_ends_its_motions_after_its_duration() {
     let dir = tempfile::tempdir().unwrap();
-    let run = |args: &[&str]| said(dir.path(), args);
     let header = "id,category,ego_speed_mps,speed_mps,thw,lateral_speed_mps,acceleration_mps2,duration_s\n";
     let braking = |duration: &str| file(dir.path(), "a.csv", &format!("{header}a,lvd,30,30,0.6,,-8,{duration}\n"));
+    let (row, lane) = ("simulate --table a.csv --models FSM", "simulate --scenarios a.csv --lane");
     for (duration, collides) in [("0.5", false), ("", true)] {
         braking(duration);
-        let (code, text) = run(&["check", "a.csv", "--profiles", "paper"]);
+        let (code, text) = said(dir.path(), "check a.csv --profiles paper");
         assert_eq!(code, i32::from(collides), "{text}");
-        let of = |args: &[&str]| run(args).1.contains("Collision FAIL");
-        let study = ["simulate", "--scenarios", "a.csv", "--lane", "a/S/0.6s/FSM"];
-        let row = ["simulate", "--table", "a.csv", "--models", "FSM"];
-        assert_eq!((of(&study), of(&row)), (collides, collides), "duration {duration:?}");
+        let of = |line: &str| said(dir.path(), line).1.contains("Collision FAIL");
+        assert_eq!([of(&format!("{lane} a/S/0.6s/FSM")), of(row)], [collides; 2], "duration {duration:?}");
     }
     // A lane change that ends half way: the series of the row is that of its scenario, up to the step at which the motions
     // end. There the row's lateral speed is 0 already, and a scenario's is that of its last sample.
     file(dir.path(), "a.csv", &format!("{header}a,cut-in,30,20,1.2,1,-2,1.2\n"));
-    let row = lanesweep(dir.path(), &["simulate", "--table", "a.csv", "--models", "FSM"]);
-    let lane = lanesweep(dir.path(), &["simulate", "--scenarios", "a.csv", "--lane", "a/S/1.2s/FSM"]);
-    let numbers = |text: &str| -> Vec<f64> {
-        let steps: Vec<&str> = text.lines().skip(1).collect();
-        let before_end = &steps[..steps.len() - 1];
-        before_end.iter().flat_map(|line| line.split(',')).filter_map(|field| field.parse().ok()).collect()
-    };
-    let (row, lane) = (numbers(&row), numbers(&lane));
+    let of = |line: &str| before_end(&ran(dir.path(), line));
+    let (row, lane) = (of(row), of(&format!("{lane} a/S/1.2s/FSM")));
     assert!(row.len() > 200, "{}", row.len());
     assert_eq!(row.len(), lane.len());
-    assert!(row.iter().zip(&lane).all(|(a, b)| (a - b).abs() <= 1e-6 * (1.0 + a.abs())));
+    assert!(row.iter().zip(&lane).all(near));
     // What is no duration is refused by all of them, with its place.
     for duration in ["0", "-1", "1e9", "nan", "0.01"] {
         braking(duration);
-        for args in [&["check", "a.csv"][..], &["simulate", "--table", "a.csv"], &["study", "--scenarios", "a.csv"]] {
-            let (code, text) = run(args);
-            assert!(code == 3 && text.contains("a.csv, line 2, column `duration_s`"), "{args:?}, {duration}: {text}");
+        for verb in ["check", "simulate --table", "study --scenarios"] {
+            refused(dir.path(), &format!("{verb} a.csv"), 3, "a.csv, line 2, column `duration_s`");
         }
     }
 }
@@ -353,11 +335,10 @@ fn simulate_takes_a_row_of_a_parquet_table() {
         ("lateral_speed", numbers(&[f64::NAN, 1.0])),
     ];
     made::write(&dir.path().join("cases.parquet"), columns, Compression::SNAPPY);
-    let table = lanesweep(dir.path(), &["simulate", "--table", "cases.parquet", "--row", "2"]);
+    let table = ran(dir.path(), "simulate --table cases.parquet --row 2");
     let flags = "simulate --category cut-in --models FSM --ego-speed 30m/s --speed 20m/s --thw 1.2 --lateral-speed 1";
-    assert_eq!(table, lanesweep(dir.path(), &flags.split(' ').collect::<Vec<_>>()));
-    let (code, text) = said(dir.path(), &["simulate", "--table", "cases.parquet", "--row", "3"]);
-    assert!(code == 2 && text.contains("there is no row 3"), "{text}");
+    assert_eq!(table, ran(dir.path(), flags));
+    refused(dir.path(), "simulate --table cases.parquet --row 3", 2, "there is no row 3");
 }
 
 #[test]
@@ -368,7 +349,7 @@ fn a_truncated_parquet_file_is_told_as_one_and_no_panic_is_printed() {
     let whole = std::fs::read(&path).unwrap();
     for length in [0, 3, whole.len() / 2, whole.len() - 1] {
         std::fs::write(&path, &whole[..length]).unwrap();
-        let (code, text) = said(dir.path(), &["study", "--scenarios", "s.parquet"]);
+        let (code, text) = said(dir.path(), "study --scenarios s.parquet");
         assert!(code == 3 && text.contains("not a Parquet file that can be read"), "{length}: {text}");
         assert!(!text.contains("panicked"), "{length}: {text}");
     }
@@ -397,35 +378,33 @@ fn row(id: usize, k: usize, speed: f64, y: f64) -> Option<String> {
 #[test]
 fn one_bad_scenario_in_ten_is_left_out_and_told_and_more_are_no_result_with_all_of_them_told() {
     let dir = tempfile::tempdir().unwrap();
-    let study = |text: &str, more: &[&str]| {
+    let study = |text: &str, more: &str| {
         file(dir.path(), "s.csv", text);
-        said(dir.path(), &[&["study", "--scenarios", "s.csv", "--out", "out", "--backend", "cpu"], more].concat())
+        said(dir.path(), &format!("study --scenarios s.csv --out out --backend cpu {more}"))
     };
-    assert_eq!(study(&cut_ins(30, |_, _| None), &[]).0, 0);
+    assert_eq!(study(&cut_ins(30, |_, _| None), "").0, 0);
     // 2.5 m to the side in 0.1 s.
     let jump = |id, k| if (id, k) == (7, 10) { row(7, 10, 20.0, 0.0) } else { None };
-    let (code, text) = study(&cut_ins(30, jump), &[]);
+    let (code, text) = study(&cut_ins(30, jump), "");
     assert_eq!(code, 4, "{text}");
     assert!(text.contains("line 151, column `target_lateral_m`, scenario s7: lateral jump: -26 m/s"), "{text}");
-    let run: serde_json::Value =
-        serde_json::from_slice(&std::fs::read(dir.path().join("out/run.json")).unwrap()).unwrap();
+    let run = json(&dir.path().join("out/run.json"));
     assert_eq!(run["categories"][0]["kept"].as_u64(), Some(29));
     assert!(run["left_out"][0].as_str().unwrap().contains("scenario s7"), "{}", run["left_out"]);
-    let (code, text) = study(&cut_ins(30, jump), &["--accept-implausible"]);
+    let (code, text) = study(&cut_ins(30, jump), "--accept-implausible");
     assert!(code == 0 && text.contains("an implausible lateral speed is used as it is, once"), "{text}");
-    let run: serde_json::Value =
-        serde_json::from_slice(&std::fs::read(dir.path().join("out/run.json")).unwrap()).unwrap();
+    let run = json(&dir.path().join("out/run.json"));
     assert!(run["notes"][0].as_str().unwrap().contains("lateral speed"), "{}", run["notes"]);
     // Neither of two scenarios of one id is used, and both count.
     let doubled = |times: usize| {
         let first = cut_ins(times, |_, _| None);
         cut_ins(30, |_, _| None) + first.split_once('\n').unwrap().1
     };
-    assert_eq!(study(&doubled(1), &[]).0, 4);
-    let (code, text) = study(&doubled(2), &[]);
+    assert_eq!(study(&doubled(1), "").0, 4);
+    let (code, text) = study(&doubled(2), "");
     assert!(code == 3 && text.contains("4 of 32 scenarios cannot be used"), "{text}");
     // A table in kilometres per hour.
-    let (code, text) = study(&cut_ins(30, |id, k| row(id, k, 108.0, 3.5)), &[]);
+    let (code, text) = study(&cut_ins(30, |id, k| row(id, k, 108.0, 3.5)), "");
     assert_eq!(code, 3, "{text}");
     assert!(text.contains("30 of 30 scenarios cannot be used") && text.contains("and 10 more"), "{text}");
     assert!(text.contains("scenario s0: 108 m/s") && text.contains("scenario s19: 108 m/s"), "{text}");
@@ -438,12 +417,12 @@ fn one_bad_scenario_in_ten_is_left_out_and_told_and_more_are_no_result_with_all_
         (4, 19) => row(4, 25, 20.0, 1.6),
         _ => None,
     };
-    let (code, text) = study(&cut_ins(30, spoilt), &[]);
+    let (code, text) = study(&cut_ins(30, spoilt), "");
     assert_eq!(code, 3, "{text}");
     for part in ["4 of 30", "is \"soon\"", "is -7; expected", "is \"left\", but \"up\"", "they must be equal"] {
         assert!(text.contains(part), "{part}: {text}");
     }
-    assert_eq!(study(&cut_ins(50, spoilt), &[]).0, 4);
+    assert_eq!(study(&cut_ins(50, spoilt), "").0, 4);
 }
 
 #[test]
@@ -481,46 +460,34 @@ fn small_negative_speeds_are_0_in_every_table_and_flag_and_larger_ones_an_error(
     assert_eq!(of_parquet(-0.49).unwrap()[1].target.v, [1.0, 0.0]);
     assert!(of_parquet(-0.5).unwrap_err().to_string().contains("column `target_v[1]`, row 2"));
 
-    let lvd = |speed: &str| {
-        ["simulate --category lvd --models FSM --ego-speed 30m/s --gap 30 --acceleration 0 --speed", speed].join(" ")
-    };
-    let simulate = |line: &str| said(dir.path(), &line.split(' ').collect::<Vec<_>>());
-    let (code, text) = simulate(&lvd("-0.01m/s"));
+    let lvd = "simulate --category lvd --models FSM --ego-speed 30m/s --gap 30 --acceleration 0 --speed";
+    let (code, text) = said(dir.path(), &format!("{lvd} -0.01m/s"));
     assert!(code == 0 && text.contains("taken as 0, once: speed"), "{text}");
-    assert_eq!(simulate(&lvd("-0.5m/s")).0, 2);
-    let map = |speed: &str| {
-        let set = format!("other_speed_mps={speed}");
-        let map = ["map", "lvd", "--x", "gap_m=10,20", "--y", "ego_speed_mps=10,20", "--set", "deceleration_mps2=1"];
-        said(dir.path(), &[&map[..], &["--set", &set, "--out", "map"]].concat())
-    };
-    let (code, text) = map("-0.01");
+    refused(dir.path(), &format!("{lvd} -0.5m/s"), 2, "");
+    let map = "map lvd --x gap_m=10,20 --y ego_speed_mps=10,20 --set deceleration_mps2=1 --out map";
+    let (code, text) = said(dir.path(), &format!("{map} --set other_speed_mps=-0.01"));
     assert!(code == 0 && text.contains("taken as 0, once: other_speed_mps = -0.01"), "{text}");
-    assert_eq!(map("-0.5").0, 2);
-    assert_eq!(map("108").0, 2);
+    refused(dir.path(), &format!("{map} --set other_speed_mps=-0.5"), 2, "");
+    refused(dir.path(), &format!("{map} --set other_speed_mps=108"), 2, "");
 }
 
 #[test]
 fn flags_that_no_road_has_are_refused_with_the_likely_unit_unless_accepted() {
     let dir = tempfile::tempdir().unwrap();
     let cut_in = "simulate --category cut-in --models FSM --lateral-speed 1 --thw 1.2 --speed 20m/s --ego-speed";
-    let simulate = |more: &str| said(dir.path(), &format!("{cut_in} {more}").split(' ').collect::<Vec<_>>());
-    let (code, text) = simulate("108");
-    assert!(
-        code == 2 && text.contains("108 has no unit: as m/s it is 388.8 km/h, as km/h 30 m/s; write 108km/h or 108m/s"),
-        "{text}"
-    );
-    let (code, text) = simulate("108m/s");
-    assert!(
-        code == 2 && text.contains("108 looks like km/h: 30 m/s") && text.contains("--accept-implausible"),
-        "{text}"
-    );
-    let (code, text) = simulate("108m/s --accept-implausible");
-    assert!(code == 0 && text.contains("WARN an implausible speed is used as it is"), "{text}");
-    let (code, text) = simulate("90m/s");
-    assert!(code == 0 && text.contains("90 looks like km/h: 25 m/s"), "{text}");
-    let (code, text) = simulate("30m/s --acceleration 6");
-    assert!(code == 2 && text.contains("acceleration: it results in a speed that no vehicle has: 740 m/s"), "{text}");
-    assert_eq!(simulate("30m/s --acceleration 6 --end-speed 40m/s").0, 0);
-    let (code, text) = simulate("30m/s --length 430");
-    assert!(code == 2 && text.contains("430 looks like cm: 4.3 m"), "{text}");
+    let unit = "108 has no unit: as m/s it is 388.8 km/h, as km/h 30 m/s; write 108km/h or 108m/s";
+    let too_fast = "acceleration: it results in a speed that no vehicle has: 740 m/s";
+    for (more, code, hint) in [
+        ("108", 2, unit),
+        ("108m/s", 2, "108 looks like km/h: 30 m/s"),
+        ("108m/s", 2, "--accept-implausible"),
+        ("108m/s --accept-implausible", 0, "WARN an implausible speed is used as it is"),
+        ("90m/s", 0, "90 looks like km/h: 25 m/s"),
+        ("30m/s --acceleration 6", 2, too_fast),
+        ("30m/s --acceleration 6 --end-speed 40m/s", 0, ""),
+        ("30m/s --length 430", 2, "430 looks like cm: 4.3 m"),
+    ] {
+        let (found, text) = said(dir.path(), &format!("{cut_in} {more}"));
+        assert!(found == code && text.contains(hint), "{more}: {found} {text}");
+    }
 }

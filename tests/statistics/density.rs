@@ -10,8 +10,7 @@ use lanesweep::scenario::parameterization::{
     Family, Kinematic, LaneChange, Parameterization, ParameterizationOptions, Reduction, Sizes, SpeedProfile,
     SvdLateral, Variable,
 };
-use lanesweep::scenario::{Case, Category, Lateral, Scenario, Side, Speed};
-use lanesweep::scenario::{DataProvenance, Driven};
+use lanesweep::scenario::{Case, Category, DataProvenance, Driven, Lateral, Scenario, Side};
 use lanesweep::stats::density::{
     Bandwidth, BandwidthRule, DensityModel, FitOptions, Kde, LeaveOneOut, ParameterSpace, SearchEnd, ValidFraction,
     normal_cdf, read_density, write_density,
@@ -138,7 +137,7 @@ fn draws_have_the_moments_of_the_density_and_any_part_can_be_drawn_alone() {
 }
 
 #[test]
-fn ten_thousand_points_are_fitted_and_the_bits_do_not_depend_on_the_number_of_threads() {
+fn the_bits_of_a_fit_do_not_depend_on_the_number_of_threads() {
     let stream = Stream { seed: 5, purpose: 5 };
     let source = with_bandwidth(vec![vec![0.0, 10.0], vec![3.0, -4.0]], vec![1.0, 2.0], 1.0);
     let points = (0..2000).map(|index| source.draw(&stream, index)).collect::<Vec<_>>();
@@ -150,19 +149,6 @@ fn ten_thousand_points_are_fitted_and_the_bits_do_not_depend_on_the_number_of_th
     assert_eq!(one, three);
     let bits = |kde: &Kde| kde.mixture().unwrap().log_density(&[1.0, 1.0]).to_bits();
     assert_eq!(bits(&one), bits(&three));
-}
-
-/// Not among the quick ones: N² distances, 25 times. `cargo test --release --test statistics density:: -- --ignored`
-#[test]
-#[ignore = "N² distances, 25 times"]
-fn ten_thousand_points_take_seconds() {
-    let stream = Stream { seed: 5, purpose: 5 };
-    let source = with_bandwidth(vec![vec![0.0; 5], vec![3.0; 5]], vec![1.0; 5], 1.0);
-    let points = (0..10_000).map(|index| source.draw(&stream, index)).collect();
-    let start = std::time::Instant::now();
-    let kde = Kde::fit(points, &names(5), BandwidthRule::Wide).unwrap();
-    println!("10,000 points, 5 parameters: {:?}, h {}", start.elapsed(), kde.bandwidth().value);
-    assert!(start.elapsed().as_secs() < 120);
 }
 
 #[test]
@@ -212,46 +198,16 @@ fn model(category: Category, key: &str) -> DensityModel {
 
 /// Equal up to the rounding of T = (v0 − v1)/ā.
 fn assert_same_case(ours: &Case, theirs: &Case, what: &str) {
-    let near = |a: f64, b: f64| assert!((a - b).abs() <= 1e-9 * (1.0 + b.abs()), "{what}: {a} instead of {b}");
-    let series = |a: &[f64], b: &[f64]| {
-        assert_eq!(a.len(), b.len(), "{what}: length of a series");
-        a.iter().zip(b).for_each(|(a, b)| near(*a, *b));
-    };
-    let speed = |a: &Speed, b: &Speed| match (a, b) {
-        (
-            Speed::Kinematic { initial_mps, acceleration_mps2, until_s },
-            Speed::Kinematic { initial_mps: i, acceleration_mps2: a, until_s: u },
-        ) => {
-            near(*initial_mps, *i);
-            near(*acceleration_mps2, *a);
-            near(*until_s, *u);
+    let [ours, theirs] = [ours, theirs].map(|case| format!("{case:?}"));
+    let parts = |text: &'_ str| text.split([' ', ',', '(', ')', '[', ']']).map(str::to_owned).collect::<Vec<_>>();
+    let (ours, theirs) = (parts(&ours), parts(&theirs));
+    assert_eq!(ours.len(), theirs.len(), "{what}");
+    for (a, b) in ours.iter().zip(&theirs) {
+        match (a.parse::<f64>(), b.parse::<f64>()) {
+            (Ok(a), Ok(b)) => assert!((a - b).abs() <= 1e-9 * (1.0 + b.abs()), "{what}: {a} instead of {b}"),
+            _ => assert_eq!(a, b, "{what}"),
         }
-        (Speed::Sampled(a), Speed::Sampled(b)) => series(a, b),
-        _ => panic!("{what}: another kind of speed"),
-    };
-    let lateral = |a: &Lateral, b: &Lateral| match (a, b) {
-        (
-            Lateral::Sampled { position_m, towards_mps },
-            Lateral::Sampled { position_m: position, towards_mps: towards },
-        ) => {
-            series(position_m, position);
-            series(towards_mps, towards);
-        }
-        _ => assert_eq!(a, b, "{what}"),
-    };
-    near(ours.horizon_s, theirs.horizon_s);
-    near(ours.ego_speed_mps, theirs.ego_speed_mps);
-    speed(&ours.principal.speed, &theirs.principal.speed);
-    lateral(&ours.principal.lateral, &theirs.principal.lateral);
-    assert_eq!(ours.ahead.is_some(), theirs.ahead.is_some(), "{what}");
-    if let (Some(a), Some(b)) = (&ours.ahead, &theirs.ahead) {
-        near(a.gap_m, b.gap_m);
-        speed(&a.vehicle.speed, &b.vehicle.speed);
-        lateral(&a.vehicle.lateral, &b.vehicle.lateral);
-        assert_eq!((a.vehicle.length_m, a.vehicle.width_m), (b.vehicle.length_m, b.vehicle.width_m), "{what}");
     }
-    let sizes = |c: &Case| (c.ego_length_m, c.ego_width_m, c.principal.length_m, c.principal.width_m);
-    assert_eq!(sizes(ours), sizes(theirs), "{what}");
 }
 
 /// A point of a decomposition with left-positive series belongs to the left.

@@ -1,4 +1,3 @@
 //! Tables as other programs write them.
 
 pub mod made;
-pub mod run;
