@@ -1,33 +1,18 @@
 //! A device counts its lanes itself: the tallies are those of the host, whatever the density, the headways and the cut into
 //! chunks; and a wrong count is found.
 
-use std::sync::OnceLock;
-
 use crate::common::device::{open, patched};
+use crate::common::mined::{fitted, scenarios};
 use lanesweep::engine::gpu::GpuOptions;
 use lanesweep::engine::{Backend, CpuBackend, Executor, Headway, SampleTally};
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{Estimator, Sample, SampleHeadways, SampleOptions};
-use lanesweep::scenario::parameterization::Parameterization;
-use lanesweep::scenario::{Category, DataProvenance, Scenario};
-use lanesweep::stats::density::{DensityModel, FitOptions};
-use lanesweep::traffic::mining::{MiningOptions, mine_generated};
-use lanesweep::traffic::trajectory::generator::GeneratorOptions;
+use lanesweep::scenario::Category;
+use lanesweep::stats::density::DensityModel;
 use lanesweep::{Error, Result};
 
-fn scenarios() -> &'static [Scenario] {
-    static SCENARIOS: OnceLock<Vec<Scenario>> = OnceLock::new();
-    SCENARIOS.get_or_init(|| {
-        let generator = GeneratorOptions { recordings: 12, ..GeneratorOptions::default() };
-        mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap().scenarios
-    })
-}
-
 fn density(category: Category, key: &str, with_thw: bool) -> DensityModel {
-    let facts =
-        DataProvenance { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
-    let fit = FitOptions { valid_draws: 100, with_thw, ..FitOptions::default() };
-    DensityModel::fit(Parameterization::find(category, key).unwrap(), scenarios(), &facts, &fit).unwrap().model
+    fitted(scenarios(), category, key, with_thw)
 }
 
 /// A tally of all samples in chunks of `chunk_lanes` lanes.

@@ -6,14 +6,7 @@ use crate::common;
 use std::path::Path;
 
 use crate::common::device::software_device;
-use assert_cmd::Command;
-
-fn done(dir: &Path, args: &[&str]) -> String {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_lanesweep"));
-    let output = command.current_dir(dir).arg("-q").args(args).output().unwrap();
-    assert_eq!(output.status.code(), Some(0), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
-}
+use crate::common::program::ran;
 
 /// The results in a folder; of the records only that they are there (they hold times and devices), of the page all but that.
 fn results(dir: &Path) -> Vec<(String, Vec<u8>)> {
@@ -40,34 +33,27 @@ fn results(dir: &Path) -> Vec<(String, Vec<u8>)> {
 /// Every run that can be split, in one piece and in so many shards, of which every other one is the device's.
 fn whole_and_shards(counts: &[u64]) {
     let Some((_, device)) = software_device() else { return };
-    let device = device.to_string();
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    let fit = ["fit", "--synth-recordings", "3", "--categories", "cut-in", "--parameterizations", "2"];
-    done(dir, &[&fit[..], &["--out", "densities"]].concat());
-    let density = "densities/cut-in-2.json";
-    let sample = ["sample", density, "--samples", "9000", "--thw", "0.4", "--models", "FSM,RSS"];
-    let pilot = ["--estimator", "is", "--backend", "cpu", "--out", "pilot"];
-    done(dir, &[&sample[..], &pilot].concat());
-    let weighted = [&sample[..], &["--estimator", "is", "--proposal", "pilot/proposal.json"]].concat();
-    let study = ["study", "--synth-recordings", "2", "--config", "generator.duration_s=240"];
-    for (name, run) in [("study", &study[..]), ("crude", &sample[..]), ("weighted", &weighted)] {
-        let whole = done(dir, &[run, &["--backend", "cpu", "--out", name]].concat());
+    ran(dir, "-q fit --synth-recordings 3 --categories cut-in --parameterizations 2 --out densities");
+    let sample = "sample densities/cut-in-2.json --samples 9000 --thw 0.4 --models FSM,RSS";
+    ran(dir, &format!("-q {sample} --estimator is --backend cpu --out pilot"));
+    let weighted = format!("{sample} --estimator is --proposal pilot/proposal.json");
+    let study = "study --synth-recordings 2 --config generator.duration_s=240";
+    for (name, run) in [("study", study), ("crude", sample), ("weighted", &weighted)] {
+        let verb = run.split(' ').next().unwrap();
+        let whole = ran(dir, &format!("-q {run} --backend cpu --out {name}"));
         for &count in counts {
             let out = format!("{name}-{count}");
-            done(dir, &[run, &["--backend", "cpu", "--plan-only", "--out", &out]].concat());
-            let plan = format!("{out}/plan.json");
+            ran(dir, &format!("-q {run} --backend cpu --plan-only --out {out}"));
             // 37 has no factor in common with the counts: every shard comes once, in no natural order.
             for shard in (0..count).map(|k| (k * 37 + 3) % count) {
-                let part = format!("{shard}/{count}");
-                let backend: &[&str] = if (shard + count).is_multiple_of(2) {
-                    &["--backend", "gpu", "--device", &device]
-                } else {
-                    &["--backend", "cpu"]
-                };
-                done(dir, &[&[run[0], "--plan", &plan, "--shard", &part, "--out", &out], backend].concat());
+                let gpu = format!("gpu --device {device}");
+                let backend = if (shard + count).is_multiple_of(2) { &gpu } else { "cpu" };
+                let part = format!("--plan {out}/plan.json --shard {shard}/{count} --out {out}");
+                ran(dir, &format!("-q {verb} {part} --backend {backend}"));
             }
-            assert_eq!(done(dir, &["merge", &out]), whole, "{out}");
+            assert_eq!(ran(dir, &format!("-q merge {out}")), whole, "{out}");
             let (merged, expected) = (results(&dir.join(&out)), results(&dir.join(name)));
             let names = |files: &[(String, Vec<u8>)]| files.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
             assert_eq!(names(&merged), names(&expected), "{out}");

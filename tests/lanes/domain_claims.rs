@@ -30,52 +30,33 @@ fn paper() -> Profile {
     Profile::load("paper").unwrap()
 }
 
+/// A case of vehicles of 4.3 m by 1.9 m.
+fn case(category: Category, ego_speed_mps: f64, principal: Participant, horizon_s: f64) -> Case {
+    let (ego_length_m, ego_width_m, lane_width_m) = (4.3, 1.9, 3.5);
+    Case { category, ego_length_m, ego_width_m, lane_width_m, ego_speed_mps, principal, ahead: None, horizon_s }
+}
+
+fn vehicle(speed: Speed, lateral: Lateral) -> Participant {
+    Participant { length_m: 4.3, width_m: 1.9, speed, lateral }
+}
+
 fn lvd(v0: f64, v1: f64, deceleration: f64) -> Case {
     let until_s = (v0 - v1) / deceleration;
-    Case {
-        category: Category::Lvd,
-        ego_length_m: 4.3,
-        ego_width_m: 1.9,
-        lane_width_m: 3.5,
-        ego_speed_mps: v0,
-        principal: Participant {
-            length_m: 4.3,
-            width_m: 1.9,
-            speed: Speed::Kinematic { initial_mps: v0, acceleration_mps2: -deceleration, until_s },
-            lateral: Lateral::Centred,
-        },
-        ahead: None,
-        horizon_s: until_s,
-    }
+    let speed = Speed::Kinematic { initial_mps: v0, acceleration_mps2: -deceleration, until_s };
+    case(Category::Lvd, v0, vehicle(speed, Lateral::Centred), until_s)
 }
 
 fn cut_in(v_ego: f64, v_other: f64, lateral: Lateral) -> Case {
-    Case {
-        category: Category::CutIn,
-        ego_length_m: 4.6,
-        ego_width_m: 1.9,
-        lane_width_m: 3.5,
-        ego_speed_mps: v_ego,
-        principal: Participant { length_m: 4.3, width_m: 1.8, speed: Speed::constant(v_other), lateral },
-        ahead: None,
-        horizon_s: 6.0,
-    }
+    let principal = Participant { width_m: 1.8, ..vehicle(Speed::constant(v_other), lateral) };
+    Case { ego_length_m: 4.6, ..case(Category::CutIn, v_ego, principal, 6.0) }
 }
 
 /// A vehicle at the ego's speed leaves the lane at a lateral speed; one that stands is ahead of it.
-fn cut_out(speed: f64, lateral_speed: f64, lead_gap_m: f64) -> Case {
-    let participant = |v, lateral| Participant { length_m: 4.3, width_m: 1.9, speed: Speed::constant(v), lateral };
+fn cut_out(speed: f64, lateral_speed: f64, gap_m: f64) -> Case {
     let leaves = Lateral::Kinematic { start_m: 0.0, rate_mps: lateral_speed, end_m: 3.5 };
-    Case {
-        category: Category::CutOut,
-        ego_length_m: 4.3,
-        ego_width_m: 1.9,
-        lane_width_m: 3.5,
-        ego_speed_mps: speed,
-        principal: participant(speed, leaves),
-        ahead: Some(Ahead { vehicle: participant(0.0, Lateral::Centred), gap_m: lead_gap_m }),
-        horizon_s: 3.5,
-    }
+    let ahead = Ahead { vehicle: vehicle(Speed::constant(0.0), Lateral::Centred), gap_m };
+    let principal = vehicle(Speed::constant(speed), leaves);
+    Case { ahead: Some(ahead), ..case(Category::CutOut, speed, principal, 3.5) }
 }
 
 /// LVDs over a grid of speeds and decelerations.
@@ -150,24 +131,19 @@ fn what_happens_after_a_step_decides_nothing_before_it() {
         for split_s in [0.3, 0.9, 2.2] {
             let split = steps(split_s);
             for (first, [a, b]) in [(0.0, [6.0, 0.0]), (4.0, [8.0, 0.0]), (4.0, [4.0, 8.0]), (6.0, [0.0, 6.0])] {
-                let lead = |then| Case {
-                    principal: Participant { speed: speed(22.0, first, then, split), ..lvd(22.0, 0.0, 1.0).principal },
-                    ..lvd(22.0, 0.0, 1.0)
+                let lead =
+                    |then| case(Category::Lvd, 22.0, vehicle(speed(22.0, first, then, split), Lateral::Centred), 22.0);
+                let enters = |then_mps: f64| lateral(3.5, -0.9, then_mps, split);
+                let cutter = |then| {
+                    let mut case = cut_in(22.0, 18.0, enters(-0.9));
+                    case.principal.speed = speed(18.0, first, then, split);
+                    case
                 };
-                let cutter = |then| Case {
-                    principal: Participant {
-                        speed: speed(18.0, first, then, split),
-                        ..cut_in(22.0, 18.0, lateral(3.5, -0.9, -0.9, split)).principal
-                    },
-                    ..cut_in(22.0, 18.0, Lateral::Centred)
-                };
-                let turns = |then: f64| cut_in(24.0, 18.0, lateral(3.5, -0.9, -then / 4.0, split));
-                let leaver = |then: f64| Case {
-                    principal: Participant {
-                        lateral: lateral(0.01, 0.9, then / 4.0, split),
-                        ..cut_out(20.0, 1.0, 40.0).principal
-                    },
-                    ..cut_out(20.0, 1.0, 40.0)
+                let turns = |then: f64| cut_in(24.0, 18.0, enters(-then / 4.0));
+                let leaver = |then: f64| {
+                    let mut case = cut_out(20.0, 1.0, 40.0);
+                    case.principal.lateral = lateral(0.01, 0.9, then / 4.0, split);
+                    case
                 };
                 let pairs: [[Case; 2]; 4] =
                     [[a, b].map(lead), [a, b].map(cutter), [a, b].map(turns), [a, b].map(leaver)];
@@ -176,13 +152,8 @@ fn what_happens_after_a_step_decides_nothing_before_it() {
                         let [one_course, other_course] = [one, other].map(|case| course(&profile, case, model, thw_s));
                         // Up to the step that both motions share; a contact may end a lane earlier.
                         let until = (split + 1).min(one_course.len()).min(other_course.len());
-                        assert_eq!(
-                            one_course[..until],
-                            other_course[..until],
-                            "{name}, {}, {:?} {split_s} s, {thw_s} s, {first} {a} {b}",
-                            model.name(),
-                            one.category
-                        );
+                        let what = format!("{name}, {model:?}, {:?} {split_s} s, {thw_s} s", one.category);
+                        assert_eq!(one_course[..until], other_course[..until], "{what}, {first} {a} {b}");
                         compared += until;
                     }
                 }
@@ -195,13 +166,10 @@ fn what_happens_after_a_step_decides_nothing_before_it() {
 /// Under the regulation's profiles a time to collision exists only while the gap closes.
 #[test]
 fn no_driver_of_the_regulation_reacts_to_a_gap_that_opens() {
-    let opens = Case {
-        principal: Participant {
-            speed: Speed::Kinematic { initial_mps: 100.0 / 3.6, acceleration_mps2: -6.8, until_s: 100.0 / 3.6 / 6.8 },
-            ..cut_in(60.0 / 3.6, 100.0 / 3.6, Lateral::Kinematic { start_m: 3.5, rate_mps: -1.5, end_m: 0.0 }).principal
-        },
-        ..cut_in(60.0 / 3.6, 100.0 / 3.6, Lateral::Kinematic { start_m: 3.5, rate_mps: -1.5, end_m: 0.0 })
-    };
+    let enters = Lateral::Kinematic { start_m: 3.5, rate_mps: -1.5, end_m: 0.0 };
+    let mut opens = cut_in(60.0 / 3.6, 100.0 / 3.6, enters);
+    opens.principal.speed =
+        Speed::Kinematic { initial_mps: 100.0 / 3.6, acceleration_mps2: -6.8, until_s: 100.0 / 3.6 / 6.8 };
     let equal_s = (100.0 - 60.0) / 3.6 / 6.8;
     for name in ["un-r157", "eu-2022-1426", "eu-2022-1426-standing"] {
         let profile = Profile::load(name).unwrap();

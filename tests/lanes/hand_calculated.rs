@@ -48,16 +48,41 @@ fn case(category: Category, ego_mps: f64, speed_mps: f64) -> PlainCase {
     }
 }
 
+/// A cutter 3.5 m beside the ego at 60 km/h, which comes in at 1 m/s.
+fn cut_in(speed_mps: f64) -> PlainCase {
+    case(Category::CutIn, V, speed_mps)
+}
+
+/// A leader at the ego's 60 km/h that brakes.
+fn braking(deceleration_mps2: f64) -> PlainCase {
+    PlainCase { acceleration_mps2: -deceleration_mps2, ..case(Category::Lvd, V, V) }
+}
+
+/// A vehicle at the ego's speed that cuts out at 1.5 m/s before a stationary one.
+fn cut_out(v: f64, ahead_gap_m: f64) -> PlainCase {
+    PlainCase { lateral_speed_mps: 1.5, ahead_gap_m, ..case(Category::CutOut, v, v) }
+}
+
+fn check_of(case: &PlainCase, headway: Headway, profile: Profile, models: &[ModelId]) -> Check {
+    Check { subject: Subject::plain(case, headway), profiles: vec![profile], models: models.to_vec() }
+}
+
+/// The judgement under a profile, at its own time step.
+fn under(profile: Profile, case: &PlainCase, headway: Headway) -> Judgement {
+    check_of(case, headway, profile, &ModelId::ALL).run_without_boundaries().unwrap().remove(0)
+}
+
+fn shipped() -> Profile {
+    Profile::load("un-r157").unwrap()
+}
+
+fn un_r157(case: &PlainCase, headway: Headway) -> Judgement {
+    under(shipped(), case, headway)
+}
+
 /// The judgement with fine steps; the verdict must not depend on the step.
 fn judged(case: &PlainCase, headway: Headway) -> Judgement {
-    let of = |dt_s: Option<f64>| {
-        let profile = Profile::load("un-r157").unwrap();
-        let profile = dt_s.map_or_else(|| profile.clone(), |dt_s| profile.clone().with_dt(dt_s).unwrap());
-        let subject = Subject::plain(case, headway);
-        let check = Check { subject, profiles: vec![profile], models: ModelId::ALL.to_vec() };
-        check.run_without_boundaries().unwrap().remove(0)
-    };
-    let (coarse, fine) = (of(None), of(Some(0.001)));
+    let (coarse, fine) = (un_r157(case, headway), under(shipped().with_dt(0.001).unwrap(), case, headway));
     assert_eq!(coarse.verdicts.answer(), fine.verdicts.answer());
     assert_eq!(coarse.demand(), fine.demand());
     fine
@@ -87,8 +112,7 @@ fn last_gap_m(judged: &Judged, vehicle: usize) -> f64 {
 
 #[test]
 fn case_1_a_leader_that_brakes_at_6_is_seen_after_0_4_s_and_answered_after_1_15_s() {
-    let lvd = PlainCase { acceleration_mps2: -6.0, ..case(Category::Lvd, V, V) };
-    let judgement = judged(&lvd, Headway::ThwS(2.0));
+    let judgement = judged(&braking(6.0), Headway::ThwS(2.0));
     let driver = of(&judgement, ModelId::Cchdm);
     near(driver.reaction_s().unwrap(), 0.4, 0.003);
     near(driver.braking_s().unwrap(), 1.15, 0.003);
@@ -101,16 +125,14 @@ fn case_1_a_leader_that_brakes_at_6_is_seen_after_0_4_s_and_answered_after_1_15_
 
 #[test]
 fn case_2_the_same_leader_10_m_ahead_is_hit_by_the_careful_driver() {
-    let lvd = PlainCase { acceleration_mps2: -6.0, ..case(Category::Lvd, V, V) };
-    let judgement = judged(&lvd, Headway::GapM(10.0));
+    let judgement = judged(&braking(6.0), Headway::GapM(10.0));
     assert!(10.0 + V * V / 12.0 < 0.4 * V + stopping_m(V), "by hand");
     assert!(of(&judgement, ModelId::Cchdm).collides());
 }
 
 #[test]
 fn case_3_a_leader_at_the_threshold_of_5_is_answered_after_the_delay_alone() {
-    let lvd = PlainCase { acceleration_mps2: -5.0, ..case(Category::Lvd, V, V) };
-    let judgement = judged(&lvd, Headway::GapM(20.0));
+    let judgement = judged(&braking(5.0), Headway::GapM(20.0));
     let driver = of(&judgement, ModelId::Cchdm);
     near(driver.braking_s().unwrap(), 0.75, 0.003);
     let expected_m = 20.0 + V * V / 10.0 - stopping_m(V);
@@ -122,7 +144,7 @@ fn case_3_a_leader_at_the_threshold_of_5_is_answered_after_the_delay_alone() {
 #[test]
 fn case_4_a_cut_in_with_1_3_s_at_lane_intrusion_has_to_be_avoided_and_is() {
     // Lane intrusion: 0.5 m of lateral gap, centre at 2.4 m, after 1.1 m or 1.1 s. Closing at 8.333 m/s.
-    let judgement = judged(&case(Category::CutIn, V, V / 2.0), Headway::GapM(20.0));
+    let judgement = judged(&cut_in(V / 2.0), Headway::GapM(20.0));
     let closing = V / 2.0;
     let ttc = reading(&judgement, "(c)");
     near(ttc.time_s.unwrap(), 1.1, 1e-6);
@@ -134,7 +156,7 @@ fn case_4_a_cut_in_with_1_3_s_at_lane_intrusion_has_to_be_avoided_and_is() {
 
 #[test]
 fn case_5_a_cut_in_with_0_94_s_is_not_demanded_and_6_mps2_hit_at_3_2_mps() {
-    let judgement = judged(&case(Category::CutIn, V, V / 2.0), Headway::GapM(17.0));
+    let judgement = judged(&cut_in(V / 2.0), Headway::GapM(17.0));
     let closing = V / 2.0;
     let at_intrusion_m = 17.0 - 1.1 * closing;
     assert_eq!(judgement.demand(), Some(Demand::Nothing));
@@ -148,7 +170,7 @@ fn case_5_a_cut_in_with_0_94_s_is_not_demanded_and_6_mps2_hit_at_3_2_mps() {
 
 #[test]
 fn case_6_a_cut_in_is_perceived_0_4_s_after_0_375_m() {
-    let judgement = judged(&case(Category::CutIn, V, V / 2.0), Headway::GapM(20.0));
+    let judgement = judged(&cut_in(V / 2.0), Headway::GapM(20.0));
     let driver = of(&judgement, ModelId::Cchdm);
     near(driver.reaction_s().unwrap(), 0.775, 0.003);
     near(driver.braking_s().unwrap(), 1.525, 0.003);
@@ -159,8 +181,7 @@ fn case_6_a_cut_in_is_perceived_0_4_s_after_0_375_m() {
 
 #[test]
 fn case_7_a_cut_out_that_uncovers_a_stationary_vehicle_is_answered_by_headway() {
-    let cut_out = PlainCase { lateral_speed_mps: 1.5, ahead_gap_m: 40.0, ..case(Category::CutOut, V, V) };
-    let judgement = judged(&cut_out, Headway::ThwS(2.0));
+    let judgement = judged(&cut_out(V, 40.0), Headway::ThwS(2.0));
     let driver = of(&judgement, ModelId::Cchdm);
     // 0.375 m at 1.5 m/s, 0.4 s of perception, 0.75 s of delay.
     near(driver.braking_s().unwrap(), 0.25 + 0.4 + 0.75, 0.003);
@@ -173,10 +194,9 @@ fn case_7_a_cut_out_that_uncovers_a_stationary_vehicle_is_answered_by_headway() 
 #[test]
 fn case_8_a_cut_out_at_130_kmh_41_8_m_before_a_stationary_vehicle_is_not_preventable() {
     let v = 130.0 * KMH;
-    let cut_out = PlainCase { lateral_speed_mps: 1.5, ahead_gap_m: 5.0, ..case(Category::CutOut, v, v) };
     // Even full deceleration at once needs 85.9 m.
     assert!(v * v / (2.0 * FULL) > 0.9 * v + 4.3 + 5.0);
-    let judgement = judged(&cut_out, Headway::ThwS(0.9));
+    let judgement = judged(&cut_out(v, 5.0), Headway::ThwS(0.9));
     assert!(is(&judgement, Answer::NotPreventable));
     assert!(judgement.verdicts.avoided_by().is_empty() && judgement.models.iter().all(Judged::collides));
 }
@@ -193,7 +213,7 @@ fn case_9_a_faster_vehicle_that_cuts_in_is_no_danger() {
 #[test]
 fn case_10_a_quick_cut_in_is_not_visible_for_0_72_s() {
     // 2 m/s: lane intrusion after 1.1 m, that is 0.55 s.
-    let quick = PlainCase { lateral_speed_mps: 2.0, ..case(Category::CutIn, V, V / 2.0) };
+    let quick = PlainCase { lateral_speed_mps: 2.0, ..cut_in(V / 2.0) };
     let judgement = judged(&quick, Headway::GapM(20.0));
     let visible = reading(&judgement, "(b)");
     near(visible.value.unwrap(), 0.55, 1e-6);
@@ -203,10 +223,9 @@ fn case_10_a_quick_cut_in_is_not_visible_for_0_72_s() {
 
 #[test]
 fn the_boundary_along_the_gap_is_where_the_verdict_turns() {
-    let subject = |gap_m| Subject::plain(&case(Category::CutIn, V, V / 2.0), Headway::GapM(gap_m));
     let check = |gap_m| {
-        let profiles = vec![Profile::load("un-r157").unwrap()];
-        Check { subject: subject(gap_m), profiles, models: vec![ModelId::Cchdm] }.run().unwrap().remove(0)
+        let check = check_of(&cut_in(V / 2.0), Headway::GapM(gap_m), shipped(), &[ModelId::Cchdm]);
+        check.run().unwrap().remove(0)
     };
     let judgement = check(20.0);
     let gap = judgement.boundaries.iter().find(|b| b.parameter.key == "gap_m").unwrap();
@@ -225,16 +244,9 @@ fn every_value_of_the_clauses_is_that_of_its_own_time() {
         near(reading.time_s.unwrap(), time_s, 1e-6);
         near(reading.value.unwrap(), value, 1e-6);
     };
-    let judged = |case: &PlainCase, headway| {
-        let profiles = vec![Profile::load("un-r157").unwrap()];
-        Check { subject: Subject::plain(case, headway), profiles, models: vec![ModelId::Cchdm] }
-            .run_without_boundaries()
-            .unwrap()
-            .remove(0)
-    };
     // 1 m/s across: the first step beyond 0.375 m is at 0.38 s and 0.38 m; perceived 0.4 s later, 20 m less 0.78 s of closing.
     let closing = V / 2.0;
-    let cut_in = judged(&case(Category::CutIn, V, V / 2.0), Headway::GapM(20.0));
+    let cut_in = un_r157(&cut_in(V / 2.0), Headway::GapM(20.0));
     at(&cut_in, "deviation from the lane centre", 0.38, 0.38);
     at(&cut_in, "TTC when perceived", 0.78, 20.0 / closing - 0.78);
     // Lane intrusion lies between two steps: 1.1 m after 1.1 s, at the same closing speed.
@@ -243,17 +255,15 @@ fn every_value_of_the_clauses_is_that_of_its_own_time() {
     at(&cut_in, "(b)", 1.1, 1.1);
     at(&cut_in, "(c)", 1.1, 20.0 / closing - 1.1);
     // A cutter that brakes at 2 m/s² from the start: 2.2 m/s and 1.21 m less at 1.1 s.
-    let braking = PlainCase { acceleration_mps2: -2.0, ..case(Category::CutIn, V, V / 2.0) };
-    let judgement = judged(&braking, Headway::GapM(20.0));
+    let slowing = PlainCase { acceleration_mps2: -2.0, ..case(Category::CutIn, V, V / 2.0) };
+    let judgement = un_r157(&slowing, Headway::GapM(20.0));
     near(reading(&judgement, "(a) relative speed").value.unwrap(), closing + 2.2, 0.001);
     near(reading(&judgement, "(c)").value.unwrap(), (20.0 - 1.1 * closing - 1.21) / (closing + 2.2), 0.01);
     assert!(reading(&judgement, "(a) largest change").holds() == Holds::No);
     // A leader that brakes at 6 m/s² from the start.
-    let braking = PlainCase { acceleration_mps2: -6.0, ..case(Category::Lvd, V, V) };
-    at(&judged(&braking, Headway::ThwS(2.0)), "deceleration at the leader's first loss of speed", 0.0, 6.0);
+    at(&un_r157(&braking(6.0), Headway::ThwS(2.0)), "deceleration at the leader's first loss of speed", 0.0, 6.0);
     // 1.5 m/s across: 0.39 m at 0.26 s; at 0.66 s the leader at the ego's speed is still 2 s ahead.
-    let cut_out = PlainCase { lateral_speed_mps: 1.5, ahead_gap_m: 40.0, ..case(Category::CutOut, V, V) };
-    let cut_out = judged(&cut_out, Headway::ThwS(2.0));
+    let cut_out = un_r157(&cut_out(V, 40.0), Headway::ThwS(2.0));
     at(&cut_out, "deviation from the lane centre", 0.26, 0.39);
     at(&cut_out, "headway when perceived", 0.66, 2.0);
 }
@@ -289,19 +299,6 @@ fn without_a_collision_of_an_ego_that_never_reacts_there_is_no_conflict() {
     assert!(judgement.verdicts.unreacting == RunEnd::Contact && !is(&judgement, Answer::NoConflict));
 }
 
-/// The judgement under a profile, at its own time step.
-fn under(profile: Profile, case: &PlainCase, headway: Headway) -> Judgement {
-    let subject = Subject::plain(case, headway);
-    Check { subject, profiles: vec![profile], models: ModelId::ALL.to_vec() }
-        .run_without_boundaries()
-        .unwrap()
-        .remove(0)
-}
-
-fn un_r157(case: &PlainCase, headway: Headway) -> Judgement {
-    under(Profile::load("un-r157").unwrap(), case, headway)
-}
-
 /// Gap that CCHDM needs from its reaction until it is no faster than a vehicle of constant speed: as to a standstill, at the
 /// closing speed.
 #[test]
@@ -312,7 +309,7 @@ fn case_11_cchdm_brakes_until_the_speeds_are_equal_and_1_1_m_are_left() {
     let expected_m = 20.0 - 0.775 * closing - stopping_m(closing);
     near(expected_m, 1.10, 0.005);
     let case = case(Category::CutIn, ego, other);
-    let fine = Profile::load("un-r157").unwrap().with_dt(0.001).unwrap();
+    let fine = shipped().with_dt(0.001).unwrap();
     let judgement = under(fine.clone(), &case, Headway::GapM(20.0));
     let driver = of(&judgement, ModelId::Cchdm);
     near(driver.trace.outcome.min_gap, expected_m, 0.02);
@@ -336,20 +333,19 @@ fn case_12_a_faster_ego_behind_a_steady_leader_is_outside_annex_3() {
     let contact_s = f64::from(driver.trace.outcome.contact_step) * 0.01;
     near(contact_s, 9.0, 0.02);
     // The least deceleration makes it react; the case stays outside.
-    let braking = PlainCase { acceleration_mps2: -0.01, ..steady };
-    let judgement = un_r157(&braking, Headway::GapM(100.0));
+    let slowing = PlainCase { acceleration_mps2: -0.01, ..steady };
+    let judgement = un_r157(&slowing, Headway::GapM(100.0));
     assert!(!of(&judgement, ModelId::Cchdm).collides());
     assert_eq!(judgement.verdict(), Verdict::OutsideAnnex);
     // At equal speeds the annex says something.
-    let equal = PlainCase { acceleration_mps2: -6.0, ..case(Category::Lvd, V, V) };
-    assert_eq!(un_r157(&equal, Headway::ThwS(2.0)).verdict(), Verdict::Answer(Answer::Preventable));
+    assert_eq!(un_r157(&braking(6.0), Headway::ThwS(2.0)).verdict(), Verdict::Answer(Answer::Preventable));
 }
 
 /// 2.0 s at 70 km/h are 38.889 m.
 #[test]
 fn case_13_a_gap_typed_to_the_centimetre_is_the_annex_headway_of_2_s() {
     let v = 70.0 * KMH;
-    let cut_out = PlainCase { lateral_speed_mps: 1.5, ahead_gap_m: 60.0, ..case(Category::CutOut, v, v) };
+    let cut_out = cut_out(v, 60.0);
     // 0.375 m at 1.5 m/s and 0.4 s; then 0.75 s.
     let brakes_s = 0.25 + 0.4 + 0.75;
     for headway in [Headway::ThwS(2.0), Headway::GapM(38.89), Headway::GapM(38.88)] {
@@ -363,7 +359,7 @@ fn case_13_a_gap_typed_to_the_centimetre_is_the_annex_headway_of_2_s() {
 #[test]
 fn case_14_a_headway_above_2_s_is_outside_annex_3() {
     let v = 70.0 * KMH;
-    let cut_out = PlainCase { lateral_speed_mps: 1.5, ahead_gap_m: 8.0, ..case(Category::CutOut, v, v) };
+    let cut_out = cut_out(v, 8.0);
     for thw_s in [2.01, 2.3] {
         let judgement = un_r157(&cut_out, Headway::ThwS(thw_s));
         assert_eq!(judgement.verdict(), Verdict::OutsideAnnex, "{thw_s} s");
@@ -433,15 +429,12 @@ fn case_17_a_cutter_in_the_path_is_attended_at_once_and_the_sheet_says_so() {
 /// The column *printed* of the book's table: the same cases at the shipped time step, which no flag of `check` changes.
 #[test]
 fn the_book_prints_the_numbers_of_the_shipped_time_step() {
-    let lvd = |decel: f64| PlainCase { acceleration_mps2: -decel, ..case(Category::Lvd, V, V) };
-    let cut_out =
-        |v: f64, ahead_gap_m| PlainCase { lateral_speed_mps: 1.5, ahead_gap_m, ..case(Category::CutOut, v, v) };
     let v = 70.0 * KMH;
     // Start of braking, s, and the smallest gap where the book has one, m.
     for (case, headway, brakes_s, gap_m) in [
-        (lvd(6.0), Headway::ThwS(2.0), 1.16, Some(15.40)),
-        (lvd(5.0), Headway::GapM(20.0), 0.76, Some(13.19)),
-        (case(Category::CutIn, V, V / 2.0), Headway::GapM(20.0), 1.53, None),
+        (braking(6.0), Headway::ThwS(2.0), 1.16, Some(15.40)),
+        (braking(5.0), Headway::GapM(20.0), 0.76, Some(13.19)),
+        (cut_in(V / 2.0), Headway::GapM(20.0), 1.53, None),
         (cut_out(V, 40.0), Headway::ThwS(2.0), 1.41, Some(32.47)),
         (case(Category::CutIn, 80.0 * KMH, 50.0 * KMH), Headway::GapM(20.0), 1.53, Some(1.14)),
         (cut_out(v, 60.0), Headway::GapM(38.89), 1.41, None),
@@ -451,10 +444,10 @@ fn the_book_prints_the_numbers_of_the_shipped_time_step() {
         near(driver.braking_s().unwrap(), brakes_s, 1e-9);
         gap_m.into_iter().for_each(|gap_m| near(driver.trace.outcome.min_gap, gap_m, 0.005));
     }
-    let cut_in = un_r157(&case(Category::CutIn, V, V / 2.0), Headway::GapM(20.0));
-    near(of(&cut_in, ModelId::Cchdm).reaction_s().unwrap(), 0.78, 1e-9);
-    near(reading(&cut_in, "TTC when perceived").value.unwrap(), 1.62, 1e-6);
-    let hit = un_r157(&case(Category::CutIn, V, V / 2.0), Headway::GapM(17.0));
+    let at_20_m = un_r157(&cut_in(V / 2.0), Headway::GapM(20.0));
+    near(of(&at_20_m, ModelId::Cchdm).reaction_s().unwrap(), 0.78, 1e-9);
+    near(reading(&at_20_m, "TTC when perceived").value.unwrap(), 1.62, 1e-6);
+    let hit = un_r157(&cut_in(V / 2.0), Headway::GapM(17.0));
     near(of(&hit, ModelId::Reg157).impact_closing_mps().unwrap() / KMH, 11.42, 0.005);
     let late = un_r157(&cut_out(v, 8.0), Headway::ThwS(2.3));
     near(of(&late, ModelId::Cchdm).reaction_s().unwrap(), 0.93, 1e-9);
@@ -463,10 +456,8 @@ fn the_book_prints_the_numbers_of_the_shipped_time_step() {
 /// The first speed below the initial one is that of index 1: a reaction to a loss of speed comes one step late.
 #[test]
 fn case_18_below_the_trigger_the_delay_begins_at_the_first_step_that_loses_speed() {
-    let soft = PlainCase { acceleration_mps2: -3.0, ..case(Category::Lvd, V, V) };
     for dt_s in [0.01, 0.1] {
-        let profile = Profile::load("un-r157").unwrap().with_dt(dt_s).unwrap();
-        let judgement = under(profile, &soft, Headway::ThwS(2.0));
+        let judgement = under(shipped().with_dt(dt_s).unwrap(), &braking(3.0), Headway::ThwS(2.0));
         near(of(&judgement, ModelId::Cchdm).reaction_s().unwrap(), dt_s, 1e-9);
     }
 }

@@ -1,6 +1,7 @@
 //! Cases made where lanes run: they mean what the host's cases mean, and every backend makes the same bits of them.
 
 use crate::common;
+use crate::common::mined::{mined, provenance};
 
 use std::sync::OnceLock;
 
@@ -15,20 +16,14 @@ use lanesweep::run::sampling::{
     plan_samples,
 };
 use lanesweep::run::study::{StudyOptions, plan_study};
-use lanesweep::scenario::DataProvenance;
 use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions};
 use lanesweep::scenario::{Category, Scenario, Tables};
 use lanesweep::stats::density::{DensityModel, FitOptions};
 use lanesweep::stats::random::Stream;
-use lanesweep::traffic::mining::{MiningOptions, mine_generated};
-use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
 fn scenarios() -> &'static [Scenario] {
     static MINED: OnceLock<Vec<Scenario>> = OnceLock::new();
-    MINED.get_or_init(|| {
-        let generator = GeneratorOptions { recordings: 12, ..GeneratorOptions::default() };
-        mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap().scenarios
-    })
+    MINED.get_or_init(|| mined(12).scenarios)
 }
 
 fn density(id: Parameterization, with_thw: bool) -> DensityModel {
@@ -36,10 +31,8 @@ fn density(id: Parameterization, with_thw: bool) -> DensityModel {
 }
 
 fn density_with(id: Parameterization, options: FitOptions) -> DensityModel {
-    let facts =
-        DataProvenance { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
     let options = FitOptions { valid_draws: 1000, ..options };
-    DensityModel::fit(id, scenarios(), &facts, &options).unwrap().model
+    DensityModel::fit(id, scenarios(), &provenance(), &options).unwrap().model
 }
 
 fn options(samples: u64, source: SampleSource) -> SampleOptions {

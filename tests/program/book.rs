@@ -15,6 +15,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
+use crate::common::program::{PROGRAM, ran};
+use crate::shell::verbs;
 use markdown::{Document, Link};
 use shell::commands;
 
@@ -57,23 +59,6 @@ fn documents() -> Vec<Document> {
     paths.map(|path| Document::read(root(), &path)).chain(chapters()).collect()
 }
 
-fn lanesweep(args: &[&str]) -> String {
-    let output = Command::new(env!("CARGO_BIN_EXE_lanesweep")).args(args).output().unwrap();
-    assert!(output.status.success(), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
-}
-
-/// The verbs as the program's own help lists them.
-fn verbs() -> Vec<String> {
-    let help = lanesweep(&["--help"]);
-    let lines = help.lines().take_while(|line| !line.starts_with("Example"));
-    let named =
-        lines.filter(|line| line.starts_with("  ") && line[2..].starts_with(|first: char| first.is_ascii_lowercase()));
-    let verbs: Vec<String> = named.filter_map(|line| line.split_whitespace().next().map(str::to_owned)).collect();
-    assert!(verbs.len() >= 10 && verbs.len() <= 17, "{help}");
-    verbs.into_iter().filter(|verb| verb != "help").collect()
-}
-
 #[test]
 #[ignore = "half a minute and more: .ci/run long-tests"]
 fn commands_print_what_the_book_says() {
@@ -98,7 +83,7 @@ fn commands_print_what_the_book_says() {
 
     let tests = trycmd::TestCases::new();
     tests.case(work.path().join("*.md")).timeout(Duration::from_secs(600)).env("NO_COLOR", "1");
-    tests.register_bin("lanesweep", Path::new(env!("CARGO_BIN_EXE_lanesweep")));
+    tests.register_bin("lanesweep", Path::new(PROGRAM));
     tests.register_bins(TOOLS.map(|tool| (tool, on_path(tool))));
     tests.run();
 
@@ -233,7 +218,7 @@ fn every_verb_is_in_the_book() {
 #[test]
 fn every_printed_command_has_a_verb_and_flags_that_exist() {
     let helps: BTreeMap<String, String> =
-        verbs().into_iter().map(|verb| (verb.clone(), lanesweep(&[&verb, "--help"]))).collect();
+        verbs().into_iter().map(|verb| (verb.clone(), ran(root(), &format!("{verb} --help")))).collect();
     let (mut wrong, mut checked) = (Vec::new(), 0);
     for document in documents() {
         // What a changelog says of an earlier version need not be true of this one.
@@ -243,7 +228,7 @@ fn every_printed_command_has_a_verb_and_flags_that_exist() {
         for (line, command) in commands(&document) {
             checked += 1;
             // Of a verb with verbs of its own, the inner one has the flags.
-            let inner = command.inner.as_ref().map(|inner| lanesweep(&[&command.verb, inner, "--help"]));
+            let inner = command.inner.as_ref().map(|inner| ran(root(), &format!("{} {inner} --help", command.verb)));
             let Some(help) = inner.as_ref().or_else(|| helps.get(&command.verb)) else {
                 wrong.push(format!("{}:{line}: there is no verb `{}`", document.path, command.verb));
                 continue;
@@ -265,38 +250,18 @@ fn every_printed_command_has_a_verb_and_flags_that_exist() {
 /// The figure that `benches/rare-failures/compare.py` draws from rows of hours of runs.
 const OF_ROWS: &str = "rare-failures.svg";
 
-/// Figures of the book: file, the command that draws it, and where. The last takes a minute.
+/// Figures of the book: file, the command that draws it, and where; `LANESWEEP_RENEW_FIGURES=1` draws them anew.
 const FIGURES: [(&str, &str, &str); 3] = [
     ("f1-cut-in.svg", "study --out OUT", "f1-cut-in.svg"),
-    (
-        "case.svg",
-        "simulate --category cut-in --models all --ego-speed 30m/s --speed 20m/s --thw 1.2 --lateral-speed 1.0 --plot OUT/case.svg",
-        "case.svg",
-    ),
+    ("case.svg", CASE, "case.svg"),
     (
         "cut_in_to_60_cchdm.svg",
         "map cut-in --preset r157 --models CCHDM,FSM --robust --out OUT",
         "cut_in_to_60_cchdm.svg",
     ),
 ];
-
-/// `LANESWEEP_RENEW_FIGURES=1` draws them anew.
-fn are_drawn(figures: &[(&str, &str, &str)]) {
-    let renew = std::env::var_os("LANESWEEP_RENEW_FIGURES").is_some();
-    let folder = root().join("docs/src/figures");
-    for (figure, command, drawn) in figures {
-        let dir = tempfile::tempdir().unwrap();
-        let out = dir.path().to_str().unwrap();
-        let command = format!("-q {}", command.replace("OUT", out));
-        lanesweep(&command.split(' ').collect::<Vec<_>>());
-        let now = fs::read(dir.path().join(drawn)).unwrap();
-        if renew {
-            fs::write(folder.join(figure), now).unwrap();
-        } else {
-            assert!(fs::read(folder.join(figure)).unwrap() == now, "{figure} is not what `{command}` draws");
-        }
-    }
-}
+const CASE: &str = "simulate --category cut-in --models all --ego-speed 30m/s --speed 20m/s --thw 1.2 --lateral-speed 1.0 \
+                    --plot OUT/case.svg";
 
 #[test]
 #[ignore = "half a minute and more: .ci/run long-tests"]
@@ -308,13 +273,16 @@ fn figures_are_what_their_commands_draw() {
     let mut present: Vec<String> = names.filter(|name| name.ends_with(".svg") && name != OF_ROWS).collect();
     present.sort_unstable();
     assert_eq!(present, listed, "every figure has its command");
-    are_drawn(&FIGURES[..3]);
-}
-
-#[test]
-#[ignore = "a minute"]
-fn the_last_figure_is_what_its_command_draws() {
-    are_drawn(&FIGURES[3..]);
+    for (figure, command, drawn) in FIGURES {
+        let dir = tempfile::tempdir().unwrap();
+        ran(dir.path(), &format!("-q {}", command.replace("OUT", dir.path().to_str().unwrap())));
+        let now = fs::read(dir.path().join(drawn)).unwrap();
+        if std::env::var_os("LANESWEEP_RENEW_FIGURES").is_some() {
+            fs::write(folder.join(figure), now).unwrap();
+        } else {
+            assert!(fs::read(folder.join(figure)).unwrap() == now, "{figure} is not what `{command}` draws");
+        }
+    }
 }
 
 #[test]
@@ -329,16 +297,4 @@ fn files_that_chapters_include_exist_and_bash_can_read_the_slurm_script() {
     }
     assert!(included >= 3, "{included}");
     assert!(Command::new("bash").arg("-n").arg(root().join("deploy/slurm-array.sh")).status().unwrap().success());
-}
-
-#[test]
-fn the_time_of_a_study_of_the_papers_size_stands_in_one_place_with_its_command() {
-    let mut found = Vec::new();
-    for path in markdown_below("docs/src").into_iter().chain(["README.md".to_owned()]) {
-        let text = fs::read_to_string(root().join(&path)).unwrap();
-        found.extend(text.split("\n\n").filter(|p| p.contains("493,600 lanes")).map(|p| (path.clone(), p.to_owned())));
-    }
-    let [(path, paragraph)] = &found[..] else { panic!("{found:?}") };
-    assert_eq!(path, "docs/src/validation.md");
-    assert!(paragraph.contains("cargo bench --bench paper_size") && paragraph.contains("benches/runs/"), "{paragraph}");
 }

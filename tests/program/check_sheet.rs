@@ -2,25 +2,23 @@
 
 use std::path::Path;
 
-use assert_cmd::Command;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
+
+use crate::common::program::{lanesweep, words};
 
 const CASE: &str = "check --category cut-in --ego-speed 60km/h --speed 40km/h --gap 15 --lateral-speed 1";
 
 /// Runs a check in a folder; its output.
-fn check(folder: &Path, args: &[&str]) -> String {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_lanesweep"));
-    let output = command.current_dir(folder).env("NO_COLOR", "1").args(args).output().unwrap();
-    let error = String::from_utf8_lossy(&output.stderr);
-    assert!([0, 1, 8, 9, 10].contains(&output.status.code().unwrap()), "{error}");
-    String::from_utf8(output.stdout).unwrap()
+fn check(folder: &Path, line: &str) -> String {
+    let (code, out, error) = lanesweep(folder, &words(line));
+    assert!([0, 1, 8, 9, 10].contains(&code), "{error}");
+    out
 }
 
 /// The document and the page of a check.
-fn sheet(folder: &Path, case: &str, more: &[&str]) -> (Value, String) {
-    let args: Vec<&str> = case.split(' ').chain(more.iter().copied()).collect();
-    let out = check(folder, &[&args[..], &["--sheet", "case.html", "--format", "json"]].concat());
+fn sheet(folder: &Path, line: &str) -> (Value, String) {
+    let out = check(folder, &format!("{line} --sheet case.html --format json"));
     (serde_json::from_str(&out).unwrap(), std::fs::read_to_string(folder.join("case.html")).unwrap())
 }
 
@@ -34,10 +32,10 @@ fn the_same_inputs_give_the_same_bytes_in_every_run_folder_and_number_of_threads
     let case = "category = \"cut-in\"\nego_speed_kmh = 60\nspeed_kmh = 40\ngap = 15\nlateral_speed = 1.0\n";
     let files = |folder: &Path, threads: &str| {
         std::fs::write(folder.join("case.toml"), case).unwrap();
-        let args = ["check", "case.toml", "--date", "12 May", "--sheet", "case.html", "--threads", threads];
-        let document = check(folder, &[&args[..], &["--format", "json"]].concat());
+        let line = format!("check case.toml --date 12.May --sheet case.html --threads {threads}");
+        let document = check(folder, &format!("{line} --format json"));
         let page = std::fs::read_to_string(folder.join("case.html")).unwrap();
-        let text = check(folder, &args);
+        let text = check(folder, &line);
         [document, page, text].map(|text| text.replace(&format!("--threads {threads}"), "--threads N"))
     };
     let first = files(here.path(), "1");
@@ -51,8 +49,8 @@ fn a_sheet_names_its_input_by_the_bytes_of_the_file_and_by_the_numbers_of_the_ca
     let dir = tempfile::tempdir().unwrap();
     let case = "category = \"cut-in\"\nego_speed_kmh = 60\nspeed_kmh = 40\ngap = 15\nlateral_speed = 1.0\n";
     std::fs::write(dir.path().join("case.toml"), case).unwrap();
-    let flags = sheet(dir.path(), CASE, &["--profiles", "un-r157"]).0["identity"].clone();
-    let (document, page) = sheet(dir.path(), "check case.toml", &["--profiles", "un-r157"]);
+    let flags = sheet(dir.path(), &format!("{CASE} --profiles un-r157")).0["identity"].clone();
+    let (document, page) = sheet(dir.path(), "check case.toml --profiles un-r157");
     assert_eq!(
         (&flags["file_sha256"], &document["identity"]["file_sha256"]),
         (&Value::Null, &sha256(case.as_bytes()).into())
@@ -61,7 +59,7 @@ fn a_sheet_names_its_input_by_the_bytes_of_the_file_and_by_the_numbers_of_the_ca
     for hash in ["case_sha256", "file_sha256"] {
         assert!(page.contains(document["identity"][hash].as_str().unwrap()), "{hash}");
     }
-    let farther = sheet(dir.path(), "check case.toml", &["--profiles", "un-r157", "--gap", "15.01"]).0;
+    let farther = sheet(dir.path(), "check case.toml --profiles un-r157 --gap 15.01").0;
     assert_eq!(farther["identity"]["file_sha256"], document["identity"]["file_sha256"]);
     assert_ne!(farther["identity"]["case_sha256"], document["identity"]["case_sha256"]);
 }
@@ -73,7 +71,7 @@ fn a_sheet_names_program_and_profile_and_a_comment_is_no_other_profile() {
     std::fs::write(dir.path().join("same.toml"), format!("# mine\n{shipped}")).unwrap();
     let changed = shipped.replace("delay_s = 0.75", "delay_s = 0.7").replace("\"un-r157\"", "\"mine\"");
     std::fs::write(dir.path().join("other.toml"), changed).unwrap();
-    let of = |profile: &str| sheet(dir.path(), CASE, &["--profiles", profile]);
+    let of = |profile: &str| sheet(dir.path(), &format!("{CASE} --profiles {profile}"));
     let hash = |document: &Value| document["profiles"][0]["sha256"].as_str().unwrap().to_owned();
     let ((ours, page), (same, _), (other, other_page)) = (of("un-r157"), of("same.toml"), of("other.toml"));
     assert!(hash(&ours).len() == 64 && page.contains(&hash(&ours)));
@@ -101,16 +99,13 @@ fn a_sheet_names_program_and_profile_and_a_comment_is_no_other_profile() {
 fn date_and_author_are_those_that_the_user_gives_and_else_lines_to_write_on() {
     let dir = tempfile::tempdir().unwrap();
     let blank = "<dt>date of the run</dt><dd></dd></div>\n<div><dt>author</dt><dd></dd>";
-    assert!(sheet(dir.path(), CASE, &[]).1.contains(blank));
-    let (document, page) = sheet(dir.path(), CASE, &["--date", "12 May 2031", "--author", "A. <b>Signer</b>"]);
-    assert_eq!(
-        (&document["identity"]["date"], &document["identity"]["author"]),
-        (&"12 May 2031".into(), &"A. <b>Signer</b>".into())
-    );
-    assert!(
-        page.contains("<dt>date of the run</dt><dd>12 May 2031</dd>") && page.contains("<dt>signature</dt><dd></dd>")
-    );
-    assert!(page.contains("A. &lt;b&gt;Signer") && !page.contains("<b>Signer"));
+    assert!(sheet(dir.path(), CASE).1.contains(blank));
+    let (document, page) = sheet(dir.path(), &format!("{CASE} --date 2031-05-12 --author A.<b>Signer</b>"));
+    let identity = &document["identity"];
+    assert_eq!([&identity["date"], &identity["author"]], ["2031-05-12", "A.<b>Signer</b>"]);
+    assert!(page.contains("<dt>date of the run</dt><dd>2031-05-12</dd>"));
+    assert!(page.contains("<dt>signature</dt><dd></dd>"));
+    assert!(page.contains("A.&lt;b&gt;Signer") && !page.contains("<b>Signer"));
 }
 
 /// FSM stops at the leader: its gap of 2 cm at the shipped step is 0.2 cm at a tenth of it.
@@ -119,7 +114,7 @@ fn the_sheet_says_what_a_tenth_of_the_time_step_changes() {
     let dir = tempfile::tempdir().unwrap();
     let case =
         "check --category cut-in --ego-speed 60km/h --speed 20km/h --gap 22 --lateral-speed 1.2 --profiles un-r157";
-    let (document, page) = sheet(dir.path(), case, &[]);
+    let (document, page) = sheet(dir.path(), case);
     let profile = &document["profiles"][0];
     let gap = |models: &Value| {
         let fsm = models.as_array().unwrap().iter().find(|model| model["model"] == "FSM").unwrap();
@@ -142,7 +137,7 @@ fn a_recorded_motion_is_drawn_for_the_seconds_that_decide() {
     let ego = serde_json::json!({"v0": 20.0, "length": 4.3, "width": 1.9});
     let line = serde_json::json!({"id": "a", "category": "lvd", "fps": 25, "kept": true, "side": "left", "ego": ego, "target": target});
     std::fs::write(dir.path().join("one.jsonl"), format!("{line}\n")).unwrap();
-    let (document, page) = sheet(dir.path(), "check one.jsonl --scenario a --gap 20 --profiles un-r157", &[]);
+    let (document, page) = sheet(dir.path(), "check one.jsonl --scenario a --gap 20 --profiles un-r157");
     assert!(page.contains("The other vehicles move as recorded, at 25 samples per second until 69.96 s"), "drawn");
     for panel in ["of the other vehicle", "grey lines: sides of the ego"] {
         assert!(page.contains(panel), "{panel}");
@@ -155,5 +150,5 @@ fn a_recorded_motion_is_drawn_for_the_seconds_that_decide() {
     let last_s = last.fold(0.0, f64::max);
     assert!(last_s < until_s && until_s < 20.0, "{last_s} {until_s}");
     // A case of plain numbers has no recorded motion.
-    assert!(!sheet(dir.path(), CASE, &[]).1.contains("move as recorded"));
+    assert!(!sheet(dir.path(), CASE).1.contains("move as recorded"));
 }

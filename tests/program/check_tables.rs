@@ -2,26 +2,18 @@
 
 use std::path::Path;
 
-use assert_cmd::Command;
 use serde_json::Value;
 
+use crate::common::program::{lanesweep, ran, refused, said, unbroken, words};
+
 /// Runs in a folder: exit status, stdout, and stderr in one line.
-fn run(dir: &Path, args: &[&str]) -> (i32, String, String) {
-    let mut program = Command::new(env!("CARGO_BIN_EXE_lanesweep"));
-    let output = program.current_dir(dir).env("NO_COLOR", "1").args(args).output().unwrap();
-    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    let error = text(&output.stderr);
-    let words: Vec<&str> = error.split_whitespace().filter(|word| *word != "│").collect();
-    // Lines break after a slash too.
-    (
-        output.status.code().unwrap(),
-        text(&output.stdout),
-        words.join(" ").replace("km/ h", "km/h").replace("m/ s", "m/s"),
-    )
+fn run(dir: &Path, line: &str) -> (i32, String, String) {
+    let (code, out, error) = lanesweep(dir, &words(line));
+    (code, out, unbroken(error.as_bytes()))
 }
 
-fn document(dir: &Path, args: &[&str]) -> Value {
-    let (code, out, error) = run(dir, &[args, &["--format", "json"]].concat());
+fn document(dir: &Path, line: &str) -> Value {
+    let (code, out, error) = run(dir, &format!("{line} --format json"));
     assert!([0, 1, 4, 8, 9, 10].contains(&code), "{code} {error}");
     serde_json::from_str(&out).unwrap()
 }
@@ -44,25 +36,25 @@ fn a_bare_speed_is_refused_in_every_way_to_give_a_case_and_0_is_not() {
         "id,category,time_s,ego_speed,ego_length,ego_width,side,target_length,target_width,target_v,target_y\n\
          a,cut-in,0,60,4,2,left,4,2,20,3.5\na,cut-in,1,60,4,2,left,4,2,20,2.5\n",
     );
-    for (args, status, place) in [
-        (&["check", "--category", "cut-in", "--ego-speed", "60"][..], 2, "--ego-speed"),
-        (&["check", "bare.toml"], 2, "bare.toml, line 2, `ego_speed`"),
-        (&["simulate", "--case-file", "bare.toml"], 2, "bare.toml, line 2, `ego_speed`"),
-        (&["export", "xosc", "--case-file", "bare.toml"], 2, "bare.toml, line 2, `ego_speed`"),
-        (&["check", "bare.csv"], 3, "bare.csv, line 2, column `ego_speed`"),
-        (&["check", "bare.csv", "--row", "1"], 3, "bare.csv, line 2, column `ego_speed`"),
-        (&["simulate", "--table", "bare.csv"], 3, "bare.csv, line 2, column `ego_speed`"),
-        (&["study", "--scenarios", "bare.csv"], 3, "bare.csv, line 2, column `ego_speed`"),
-        (&["study", "--scenarios", "instants.csv"], 3, "instants.csv, line 2, column `ego_speed`, scenario a"),
+    for (line, status, place) in [
+        ("check --category cut-in --ego-speed 60", 2, "--ego-speed"),
+        ("check bare.toml", 2, "bare.toml, line 2, `ego_speed`"),
+        ("simulate --case-file bare.toml", 2, "bare.toml, line 2, `ego_speed`"),
+        ("export xosc --case-file bare.toml", 2, "bare.toml, line 2, `ego_speed`"),
+        ("check bare.csv", 3, "bare.csv, line 2, column `ego_speed`"),
+        ("check bare.csv --row 1", 3, "bare.csv, line 2, column `ego_speed`"),
+        ("simulate --table bare.csv", 3, "bare.csv, line 2, column `ego_speed`"),
+        ("study --scenarios bare.csv", 3, "bare.csv, line 2, column `ego_speed`"),
+        ("study --scenarios instants.csv", 3, "instants.csv, line 2, column `ego_speed`, scenario a"),
     ] {
-        let (code, _, error) = run(dir, args);
-        assert!(code == status && error.contains(BOTH) && error.contains(place), "{args:?}: {code} {error}");
-        assert!(error.contains("60km/h or 60m/s"), "{args:?}: {error}");
-        assert_eq!(error.contains("`ego_speed_kmh`"), status == 3 || place.contains("toml"), "{args:?}: {error}");
+        let (code, error) = said(dir, line);
+        assert!(code == status && error.contains(BOTH) && error.contains(place), "{line}: {code} {error}");
+        assert!(error.contains("60km/h or 60m/s"), "{line}: {error}");
+        assert_eq!(error.contains("`ego_speed_kmh`"), status == 3 || place.contains("toml"), "{line}: {error}");
     }
     file(dir, "still.csv", "category,ego_speed_kmh,speed,gap,acceleration\nlvd,60,0,60,-1\n");
-    let (code, _, error) = run(dir, &["simulate", "--table", "still.csv", "--models", "FSM"]);
-    assert_eq!(code, 0, "a standing vehicle needs no unit: {error}");
+    // A standing vehicle needs no unit.
+    ran(dir, "simulate --table still.csv --models FSM");
 }
 
 /// 60 km/h, 40 km/h, 15 m and 1 m/s in all spellings are one case.
@@ -71,7 +63,7 @@ fn the_unit_may_stand_in_the_name_or_in_the_value() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     let flags = "check --category cut-in --ego-speed 60km/h --speed 40km/h --gap 15 --lateral-speed 1 --profiles paper";
-    let by_flags = document(dir, &flags.split(' ').collect::<Vec<_>>());
+    let by_flags = document(dir, flags);
     let keys = [
         "ego_speed_kmh = 60\nspeed_kmh = 40.0\ngap = 15\nlateral_speed = 1",
         "ego_speed = \"60km/h\"\nspeed = \"40 KM/H\"\ngap_m = 15\nlateral_speed = \"1m/s\"",
@@ -79,14 +71,14 @@ fn the_unit_may_stand_in_the_name_or_in_the_value() {
     ];
     for keys in keys {
         file(dir, "case.toml", &format!("category = \"cut-in\"\n{keys}\n"));
-        let by_toml = document(dir, &["check", "case.toml", "--profiles", "paper"]);
+        let by_toml = document(dir, "check case.toml --profiles paper");
         assert_eq!(by_toml["profiles"], by_flags["profiles"], "{keys}");
         let pairs: Vec<(&str, &str)> = keys.lines().map(|line| line.split_once(" = ").unwrap()).collect();
         let names: Vec<&str> = pairs.iter().map(|(name, _)| *name).collect();
         let values: Vec<&str> = pairs.iter().map(|(_, value)| value.trim_matches('"')).collect();
         let table = format!("category,{}\ncut-in,{}\n", names.join(","), values.join(","));
         file(dir, "case.csv", &table);
-        let by_row = document(dir, &["check", "case.csv", "--row", "1", "--profiles", "paper"]);
+        let by_row = document(dir, "check case.csv --row 1 --profiles paper");
         assert_eq!(by_row["profiles"], by_flags["profiles"], "{table}");
     }
 }
@@ -107,11 +99,9 @@ fn two_units_of_one_quantity_and_units_of_another_are_refused_with_their_place()
         ("lateral_sped = 1", "line 2", "did you mean `lateral_speed`?"),
     ] {
         file(dir, "case.toml", &format!("category = \"cut-in\"\n{keys}\n"));
-        let (code, _, error) = run(dir, &["check", "case.toml"]);
-        assert!(
-            code == 2 && error.contains(&format!("case.toml, {line}")) && error.contains(problem),
-            "{keys}: {error}"
-        );
+        let (code, error) = said(dir, "check case.toml");
+        let place = format!("case.toml, {line}");
+        assert!(code == 2 && error.contains(&place) && error.contains(problem), "{keys}: {error}");
     }
     for (header, row, place, problem) in [
         ("speed_kmh,speed_mps", "40,11", "column `speed_mps`", "holds the same as the column `speed_kmh`"),
@@ -120,7 +110,7 @@ fn two_units_of_one_quantity_and_units_of_another_are_refused_with_their_place()
         ("acceleration", "-0.6g", "column `acceleration`", "-5.884m/s2 if -0.6 g is meant"),
     ] {
         file(dir, "case.csv", &format!("category,{header}\ncut-in,{row}\n"));
-        let (code, _, error) = run(dir, &["check", "case.csv"]);
+        let (code, error) = said(dir, "check case.csv");
         assert!(code == 3 && error.contains(place) && error.contains(problem), "{header}: {error}");
     }
 }
@@ -149,19 +139,17 @@ fn a_table_is_judged_whole_and_its_status_is_that_of_the_worst_row() {
         (&[2, 3], 9, "no conflict"),
     ] {
         table(rows);
-        let (code, out, error) = run(dir, &["check", "cases.csv"]);
+        let (code, out, error) = run(dir, "check cases.csv");
         assert_eq!(code, status, "{out} {error}");
-        let found = document(dir, &["check", "cases.csv"]);
+        let found = document(dir, "check cases.csv");
         assert_eq!(found["verdict"], verdict);
         let cases = found["cases"].as_array().unwrap();
         assert_eq!(cases.len(), rows.len());
         for (at, (case, &row)) in cases.iter().zip(rows).enumerate() {
             assert_eq!((&case["verdict"], &case["row"]), (&ROWS[row].1.into(), &(at + 1).into()));
             // The line of a row is its sheet.
-            let number = (at + 1).to_string();
-            let alone = ["check", "cases.csv", "--row", &number, "--profiles", "un-r157"];
-            let (status, _, _) = run(dir, &alone);
-            assert_eq!(status, ROWS[row].2);
+            let alone = format!("check cases.csv --row {} --profiles un-r157", at + 1);
+            assert_eq!(said(dir, &alone).0, ROWS[row].2);
             let sheet = document(dir, &alone);
             assert_eq!(case["answer"], sheet["answer"]);
             for model in sheet["profiles"][0]["models"].as_array().unwrap() {
@@ -180,7 +168,7 @@ fn a_table_is_judged_whole_and_its_status_is_that_of_the_worst_row() {
     }
     // Flags override every row, as they override one.
     table(&[0, 1]);
-    let (code, out, error) = run(dir, &["check", "cases.csv", "--gap", "200"]);
+    let (code, out, error) = run(dir, "check cases.csv --gap 200");
     assert!(code == 0 && out.contains("2 cases under un-r157: 2 preventable"), "{out} {error}");
 }
 
@@ -190,13 +178,11 @@ fn the_answers_of_a_table_go_to_a_table_in_the_order_of_the_file() {
     let dir = dir.path();
     let rows: String = [2, 1, 0, 3].iter().map(|&at: &usize| format!("{}\n", ROWS[at].0)).collect();
     file(dir, "cases.csv", &format!("{HEADER}{rows}no-gap,cut-in,60,40,,1\n"));
-    let (code, _, error) = run(dir, &["check", "cases.csv", "--rows", "answers.csv"]);
-    assert_eq!(code, 4, "one row has no gap: {error}");
+    assert_eq!(said(dir, "check cases.csv --rows answers.csv").0, 4, "one row has no gap");
     let answers = std::fs::read_to_string(dir.join("answers.csv")).unwrap();
     let verdicts: Vec<&str> = answers.lines().skip(1).map(|line| line.split(',').nth(2).unwrap()).collect();
     assert_eq!(verdicts, ["no conflict", "preventable", "not preventable", "no conflict"]);
-    let (code, _, error) = run(dir, &["check", "cases.csv", "--row", "2", "--rows", "answers.csv"]);
-    assert!(code == 2 && error.contains("--rows"), "{error}");
+    refused(dir, "check cases.csv --row 2 --rows answers.csv", 2, "--rows");
 }
 
 /// Cases far from every boundary have the same answer by lanes as by the full check.
@@ -206,16 +192,15 @@ fn a_nominal_batch_answers_by_lanes_and_says_that_nothing_else_was_examined() {
     let dir = dir.path();
     let rows: String = ROWS.iter().map(|row| format!("{}\n", row.0)).collect();
     file(dir, "cases.csv", &format!("{HEADER}{rows}"));
-    let nominal = ["check", "cases.csv", "--nominal", "--backend", "cpu"];
-    let (code, out, error) = run(dir, &nominal);
+    let nominal = "check cases.csv --nominal --backend cpu";
+    let (code, out, error) = run(dir, nominal);
     assert!(code == 1 && out.contains("no answer is robust by this table"), "{out} {error}");
-    let found = document(dir, &nominal);
+    let found = document(dir, nominal);
     assert_eq!(found["nominal"], true);
     for (case, row) in found["cases"].as_array().unwrap().iter().zip(ROWS) {
         assert_eq!(case["verdict"], row.1, "{case}");
     }
-    let threads = run(dir, &[&nominal[..], &["--threads", "1", "--format", "json"]].concat()).1;
-    assert_eq!(serde_json::from_str::<Value>(&threads).unwrap(), found, "threads change nothing");
+    assert_eq!(document(dir, &format!("{nominal} --threads 1")), found, "threads change nothing");
 }
 
 #[test]
@@ -232,16 +217,16 @@ fn a_row_that_cannot_be_judged_is_named_and_the_others_are_judged() {
         ("b,cut-in,1080,72,36,1", "cases.csv, line 3, column `ego_speed_kmh`"),
     ] {
         file(dir, "cases.csv", &format!("{HEADER}{mild}\n{row}\nlast,cut-in,60,70,12,1\n"));
-        let (code, out, error) = run(dir, &["check", "cases.csv"]);
+        let (code, out, error) = run(dir, "check cases.csv");
         assert!(code == 4 && error.contains(place), "{row}: {code} {error}");
         assert!(out.contains("2 cases under un-r157: 1 preventable, 1 no conflict; 1 row cannot be judged"), "{out}");
-        let found = document(dir, &["check", "cases.csv"]);
+        let found = document(dir, "check cases.csv");
         assert!(found["cannot_be_judged"][0].as_str().unwrap().contains(place), "{found}");
         let rows: Vec<&Value> = found["cases"].as_array().unwrap().iter().map(|case| &case["row"]).collect();
         assert_eq!(rows, [1, 3]);
     }
     file(dir, "cases.csv", HEADER);
-    assert_eq!(run(dir, &["check", "cases.csv"]).0, 3, "a table without rows has no answer");
+    assert_eq!(run(dir, "check cases.csv").0, 3, "a table without rows has no answer");
 }
 
 #[test]
@@ -251,16 +236,14 @@ fn of_two_rows_with_one_id_neither_is_used_in_any_path() {
     let again = "away,cut-in,108,72,40,1";
     file(dir, "cases.csv", &format!("{HEADER}{}\n{}\n{again}\n", ROWS[2].0, ROWS[1].0));
     let said = "cases.csv, line 4, column `id`: this id belongs to line 2 too";
-    let (code, out, error) = run(dir, &["check", "cases.csv"]);
+    let (code, out, error) = run(dir, "check cases.csv");
     assert!(code == 4 && error.contains(said), "{error}");
     assert!(out.contains("1 case under un-r157: 1 preventable; 2 rows cannot be judged"), "{out}");
     assert!(!out.contains("away") && error.contains("line 2, column `id`: this id belongs to line 4 too"), "{error}");
-    for args in [&["check", "cases.csv", "--row", "3"][..], &["simulate", "--table", "cases.csv", "--row", "3"]] {
-        let (code, _, error) = run(dir, args);
-        assert!(code == 3 && error.contains(said), "{args:?}: {error}");
+    for line in ["check cases.csv --row 3", "simulate --table cases.csv --row 3"] {
+        refused(dir, line, 3, said);
     }
-    let (code, _, error) = run(dir, &["study", "--scenarios", "cases.csv"]);
-    assert!(code == 3 && error.contains("this id belongs to line 2 too"), "{error}");
+    refused(dir, "study --scenarios cases.csv", 3, "this id belongs to line 2 too");
 }
 
 #[test]
@@ -268,14 +251,14 @@ fn what_shows_one_case_asks_for_a_row_of_a_table_with_several() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     file(dir, "cases.csv", &format!("{HEADER}{}\n{}\n", ROWS[0].0, ROWS[1].0));
-    for flag in [["--sheet", "case.html"], ["--series", "case.csv"]] {
-        let (code, _, error) = run(dir, &[&["check", "cases.csv"], &flag[..]].concat());
-        assert!(code == 2 && error.contains(flag[0]) && error.contains("--row N"), "{error}");
-        let (code, _, error) = run(dir, &[&["check", "cases.csv", "--row", "2"], &flag[..]].concat());
-        assert!(code == 0 && dir.join(flag[1]).exists(), "{error}");
+    for (flag, name) in [("--sheet", "case.html"), ("--series", "case.csv")] {
+        for hint in [flag, "--row N"] {
+            refused(dir, &format!("check cases.csv {flag} {name}"), 2, hint);
+        }
+        ran(dir, &format!("check cases.csv --row 2 {flag} {name}"));
+        assert!(dir.join(name).exists());
     }
-    let (code, _, error) = run(dir, &["check", "cases.csv", "--profiles", "un-r157,paper"]);
-    assert!(code == 2 && error.contains("under one profile"), "{error}");
-    let (code, _, error) = run(dir, &["simulate", "--table", "cases.csv"]);
-    assert!(code == 2 && error.contains("the table has several cases") && error.contains("--row N"), "{error}");
+    refused(dir, "check cases.csv --profiles un-r157,paper", 2, "under one profile");
+    refused(dir, "simulate --table cases.csv", 2, "the table has several cases");
+    refused(dir, "simulate --table cases.csv", 2, "--row N");
 }

@@ -110,21 +110,6 @@ fn too_few_scenarios_for_a_decomposition_leave_it_out_and_say_so() {
 }
 
 #[test]
-fn a_case_from_flags_from_toml_and_from_a_table_row_is_the_same_case() {
-    let dir = tempfile::tempdir().unwrap();
-    let toml =
-        "category = \"cut-in\"\nmodels = \"FSM\"\nego_speed_mps = 30\nspeed_kmh = 72\nthw = 1.2\nlateral_speed = 1.0\n";
-    std::fs::write(dir.path().join("case.toml"), toml).unwrap();
-    let table = "category,models,ego_speed_mps,speed_mps,thw,lateral_speed\nlvd,RSS,1,1,1,\ncut-in,FSM,30,20,1.2,1.0\n";
-    std::fs::write(dir.path().join("cases.csv"), table).unwrap();
-    let flags = "simulate --category cut-in --models FSM --ego-speed 30m/s --speed 20m/s --thw 1.2 --lateral-speed 1";
-    let by_flags = ran(dir.path(), flags);
-    assert!(!by_flags.is_empty());
-    assert_eq!(by_flags, ran(dir.path(), "simulate --case-file case.toml"));
-    assert_eq!(by_flags, ran(dir.path(), "simulate --table cases.csv --row 2"));
-}
-
-#[test]
 fn wrong_words_are_answered_with_what_to_write_instead() {
     let dir = tempfile::tempdir().unwrap();
     for (name, content) in [
@@ -399,6 +384,9 @@ fn a_study_of_some_headways_and_models_computes_no_claim_that_needs_all() {
     let verdicts: Vec<String> = claims.records().map(|row| row.unwrap()[verdict].to_owned()).collect();
     assert!(verdicts.len() > 3 && verdicts.iter().all(|v| v == "not computed"), "{verdicts:?}");
     let headways = read(dir.path(), "out/headways.csv");
+    let page = read(dir.path(), "out/report.html");
+    assert!(page.contains("LVD failures") && !page.contains("cut-in 2") && !page.contains("not computed"), "{page}");
+    assert!(!page.contains("claims on this data"), "{page}");
     assert!(headways.contains(",1.2s,RSS,") && !headways.contains(",2s,") && !headways.contains("CCHDM"), "{headways}");
 }
 

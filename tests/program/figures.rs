@@ -6,7 +6,7 @@
 use std::fs;
 use std::path::Path;
 
-use assert_cmd::Command;
+use crate::common::program::ran;
 
 /// The figures of cut-ins whose tables are kept.
 const KEPT: [&str; 5] = ["f1", "radar", "recall-precision", "f1-by-parameters", "headways"];
@@ -21,11 +21,7 @@ struct Row {
 
 fn study() -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
-    let flags =
-        ["-q", "study", "--synth-recordings", "12", "--categories", "cut-in", "--thw", "0.4,1.2", "--backend", "cpu"];
-    let mut command = Command::new(env!("CARGO_BIN_EXE_lanesweep"));
-    let output = command.args(flags).arg("--out").arg(dir.path()).output().unwrap();
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    ran(dir.path(), "-q study --synth-recordings 12 --categories cut-in --thw 0.4,1.2 --backend cpu --out .");
     dir
 }
 
@@ -114,10 +110,8 @@ fn the_tables_of_the_figures_are_those_that_were_looked_at() {
 #[test]
 fn a_mean_over_cells_is_that_of_the_scores_in_the_table() {
     let dir = tempfile::tempdir().unwrap();
-    let flags = ["-q", "study", "--synth-recordings", "6", "--categories", "cut-in", "--cross-validate"];
-    let mut command = Command::new(env!("CARGO_BIN_EXE_lanesweep"));
-    let output = command.args(flags).args(["--backend", "cpu", "--out"]).arg(dir.path()).output().unwrap();
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let study = "-q study --synth-recordings 6 --categories cut-in --cross-validate --backend cpu";
+    ran(dir.path(), &format!("{study} --out ."));
     let table = |name: &str| {
         let mut reader = csv::Reader::from_path(dir.path().join(name)).unwrap();
         let header = reader.headers().unwrap().clone();

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
+use crate::common::program::PROGRAM;
 use crate::common::skipped;
+use crate::shell::verbs_of;
 
 /// A configuration with fewer recordings.
 fn fewer_recordings() -> &'static Path {
@@ -18,38 +20,24 @@ fn fewer_recordings() -> &'static Path {
 }
 
 fn run(dir: &Path, line: &str) -> Output {
-    let args = line.split_whitespace().skip(1);
-    Command::new(env!("CARGO_BIN_EXE_lanesweep"))
-        .current_dir(dir)
-        // Help in one line per example.
-        .env("COLUMNS", "1000")
-        .env("LANESWEEP_CONFIG", fewer_recordings())
-        .args(args)
-        .output()
-        .unwrap()
+    let mut command = Command::new(PROGRAM);
+    // Help in one line per example.
+    command.current_dir(dir).env("COLUMNS", "1000").env("LANESWEEP_CONFIG", fewer_recordings());
+    command.args(line.split_whitespace().skip(1)).output().unwrap()
 }
 
 fn message_of(output: &Output) -> String {
     format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
 }
 
-/// The verbs of the program, or those of one of its verbs.
-fn verbs_of(dir: &Path, of: &str) -> Vec<String> {
-    let help = String::from_utf8(run(dir, &format!("lanesweep {of} --help")).stdout).unwrap();
-    let lines = help.lines().take_while(|line| !line.starts_with("Example"));
-    let verbs =
-        lines.filter(|line| line.starts_with("  ") && line[2..].starts_with(|first: char| first.is_ascii_lowercase()));
-    verbs.filter_map(|line| line.split_whitespace().next()).filter(|v| *v != "help").map(str::to_owned).collect()
-}
-
 /// The verbs, those first whose results others read, and after them the verbs that they have.
-fn verbs(dir: &Path) -> Vec<String> {
-    let mut verbs = verbs_of(dir, "");
+fn verbs() -> Vec<String> {
+    let mut verbs = verbs_of("");
     let first = ["synth", "mine", "study", "fit"];
     verbs.sort_by_key(|verb| first.iter().position(|f| f == verb).unwrap_or(first.len()));
     let inner =
-        verbs.iter().flat_map(|verb| verbs_of(dir, verb).into_iter().map(move |inner| format!("{verb} {inner}")));
-    let inner: Vec<String> = inner.collect();
+        |verb: &String| verbs_of(verb).into_iter().map(move |inner| format!("{verb} {inner}")).collect::<Vec<_>>();
+    let inner: Vec<String> = verbs.iter().flat_map(inner).collect();
     assert!(verbs.len() >= 10 && inner.len() >= 7, "{verbs:?} {inner:?}");
     verbs.into_iter().chain(inner).collect()
 }
@@ -57,18 +45,10 @@ fn verbs(dir: &Path) -> Vec<String> {
 fn examples(dir: &Path, verb: &str) -> Vec<String> {
     let help = String::from_utf8(run(dir, &format!("lanesweep {verb} --help")).stdout).unwrap();
     let (_, examples) = help.split_once("\nExample").unwrap_or_else(|| panic!("{verb} ends with no example"));
-    examples
-        .replace("\\\n", "")
-        .lines()
-        .map(str::trim)
-        .filter(|line| line.starts_with("lanesweep "))
-        .map(str::to_owned)
-        .collect()
-}
-
-/// What a shell would do with the output is the shell's.
-fn without_redirection(line: String) -> String {
-    line.split(" > ").next().unwrap_or_default().to_owned()
+    let examples = examples.replace("\\\n", "");
+    let lines = examples.lines().map(str::trim).filter(|line| line.starts_with("lanesweep "));
+    // What a shell would do with the output is the shell's.
+    lines.map(|line| line.split(" > ").next().unwrap_or_default().to_owned()).collect()
 }
 
 /// The same command on less: fewer samples, lanes and comparisons; nothing that the example shows is left out.
@@ -108,8 +88,8 @@ fn every_example_of_the_help_runs() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     let mut ran = BTreeSet::new();
-    for verb in verbs(dir) {
-        for example in examples(dir, &verb).into_iter().map(without_redirection) {
+    for verb in verbs() {
+        for example in examples(dir, &verb) {
             if ran.contains(&example) {
                 continue;
             }

@@ -2,12 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use assert_cmd::Command;
+use crate::common::program::ran;
 
-fn lanesweep(dir: &Path, args: &[&str]) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_lanesweep"));
-    let output = command.current_dir(dir).arg("-q").args(args).output().unwrap();
-    assert_eq!(output.status.code(), Some(0), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
+fn quietly(dir: &Path, line: &str) {
+    ran(dir, &format!("-q {line}"));
 }
 
 /// The page in a folder, after what holds of every page.
@@ -49,8 +47,8 @@ fn page(dir: &Path) -> String {
 
 /// Scenarios of the generator, as lines of a scenario file.
 fn scenarios(dir: &Path) -> Vec<String> {
-    lanesweep(dir, &["synth", "recordings", "--synth-recordings", "2", "--config", "generator.duration_s=240"]);
-    lanesweep(dir, &["mine", "recordings", "--out", "all.jsonl"]);
+    quietly(dir, "synth recordings --synth-recordings 2 --config generator.duration_s=240");
+    quietly(dir, "mine recordings --out all.jsonl");
     let text = std::fs::read_to_string(dir.join("all.jsonl")).unwrap();
     let kept = text.lines().filter(|line| line.contains("\"kept\":true")).map(str::to_owned).collect::<Vec<_>>();
     assert!(kept.len() > 20);
@@ -59,7 +57,7 @@ fn scenarios(dir: &Path) -> Vec<String> {
 
 fn study(dir: &Path, name: &str, lines: &[String]) -> (PathBuf, String) {
     std::fs::write(dir.join("some.jsonl"), lines.join("\n") + "\n").unwrap();
-    lanesweep(dir, &["study", "--scenarios", "some.jsonl", "--backend", "cpu", "--out", name]);
+    quietly(dir, &format!("study --scenarios some.jsonl --backend cpu --out {name}"));
     let out = dir.join(name);
     let html = page(&out);
     (out, html)
@@ -68,7 +66,7 @@ fn study(dir: &Path, name: &str, lines: &[String]) -> (PathBuf, String) {
 #[test]
 fn a_study_says_everything_on_its_page_and_every_figure_has_its_files() {
     let dir = tempfile::tempdir().unwrap();
-    lanesweep(dir.path(), &["study", "--synth-recordings", "2", "--published", "--backend", "cpu", "--out", "s"]);
+    quietly(dir.path(), "study --synth-recordings 2 --published --backend cpu --out s");
     let out = dir.path().join("s");
     let html = page(&out);
     let plan = "<dt>SHA-256 of the plan</dt>";
@@ -116,22 +114,19 @@ fn little_data_makes_a_readable_page_too() {
 fn sampling_runs_maps_and_comparisons_have_their_page() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    let fit = ["fit", "--synth-recordings", "3", "--categories", "cut-in", "--parameterizations", "2"];
-    lanesweep(dir, &[&fit[..], &["--out", "d"]].concat());
-    let sample = ["sample", "d/cut-in-2.json", "--backend", "cpu", "--samples", "3000"];
-    lanesweep(dir, &[&sample[..], &["--thw", "1,0.6,0.2", "--out", "mc"]].concat());
+    quietly(dir, "fit --synth-recordings 3 --categories cut-in --parameterizations 2 --out d");
+    let sample = "sample d/cut-in-2.json --backend cpu --samples 3000";
+    quietly(dir, &format!("{sample} --thw 1,0.6,0.2 --out mc"));
     let html = page(&dir.join("mc"));
-    let density = "<dt>SHA-256 of the density</dt>";
-    for said in ["convergence.svg", "headways.csv", density, "verdict"] {
+    for said in ["convergence.svg", "headways.csv", "<dt>SHA-256 of the density</dt>", "verdict"] {
         assert!(html.contains(said), "{said}");
     }
-    let is = ["--estimator", "is", "--thw", "0.2", "--models", "RSS", "--out", "is"];
-    lanesweep(dir, &[&sample[..], &is].concat());
+    quietly(dir, &format!("{sample} --estimator is --thw 0.2 --models RSS --out is"));
     assert!(page(&dir.join("is")).contains("effective failures"));
     // The page of an earlier run does not stay beside the results of a later one.
-    lanesweep(dir, &[&sample[..], &["--thw", "1", "--out", "mc"]].concat());
+    quietly(dir, &format!("{sample} --thw 1 --out mc"));
     assert!(!dir.join("mc/headways.csv").exists());
-    let map = ["map", "cut-in", "--x", "gap_m=5..60/5", "--y", "lateral_speed_mps=0.2..1.8/0.4", "--set"];
-    lanesweep(dir, &[&map[..], &["ego_speed_kmh=90", "--set", "other_speed_kmh=50", "--out", "map"]].concat());
+    let case = "--set ego_speed_kmh=90 --set other_speed_kmh=50";
+    quietly(dir, &format!("map cut-in --x gap_m=5..60/5 --y lateral_speed_mps=0.2..1.8/0.4 {case} --out map"));
     assert!(page(&dir.join("map")).contains("Share of cells"));
 }

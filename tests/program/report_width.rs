@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::common::golden;
-use assert_cmd::Command;
+use crate::common::program::command;
 
 fn assert_fits(text: &str, width: usize) {
     for line in text.lines() {
@@ -14,9 +14,8 @@ fn assert_fits(text: &str, width: usize) {
 
 /// stdout and stderr.
 fn study(dir: &Path, columns: &str, args: &[&str]) -> (String, String) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_lanesweep"));
-    let command = command.current_dir(dir).env("NO_COLOR", "1").env("COLUMNS", columns);
-    let output = command.arg("study").args(["--backend", "cpu"]).args(args).output().unwrap();
+    let output =
+        command(dir, &[]).env("COLUMNS", columns).args(["study", "--backend", "cpu"]).args(args).output().unwrap();
     let [out, err] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
     assert!(output.status.success(), "{err}");
     (out, err)
@@ -41,17 +40,4 @@ fn a_study_answers_on_one_screen() {
         assert!(err.contains("report.html"), "where the page is: {err}");
     }
     assert_fits(&study(dir.path(), "50", &GENERATED).0, 50);
-}
-
-#[test]
-fn a_study_of_one_category_or_model_shows_no_claims_that_it_could_not_compute() {
-    let dir = tempfile::tempdir().unwrap();
-    let page = |args: &[&str]| {
-        study(dir.path(), "120", &[&GENERATED[..], args].concat());
-        std::fs::read_to_string(dir.path().join("lanesweep-out/report.html")).unwrap()
-    };
-    assert!(!page(&["--models", "FSM"]).contains("claims on this data"));
-    let of_one_category = page(&["--categories", "lvd"]);
-    assert!(of_one_category.contains("LVD failures") && !of_one_category.contains("cut-in 2"), "{of_one_category}");
-    assert!(!of_one_category.contains("not computed"), "{of_one_category}");
 }

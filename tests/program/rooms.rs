@@ -45,28 +45,3 @@ fn the_library_names_no_flag() {
     }
     assert!(texts > 1000, "only {texts} texts were found");
 }
-
-/// ARCHITECTURE.md names these: the FSM's demand, a sampled case's times, the BTN, and the reported TTC and measures.
-#[test]
-fn lanes_divide_only_where_the_architecture_says() {
-    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut found = Vec::new();
-    files(&src, &mut found);
-    let divides = |path: &&PathBuf| !path.ends_with("model/scalar.rs") && code(path).contains(".exact_div(");
-    let mut files: Vec<_> =
-        found.iter().filter(divides).map(|path| path.strip_prefix(&src).unwrap().to_owned()).collect();
-    files.sort();
-    let named = [
-        "engine/generated/decode.rs",
-        "model/criterion/btn.rs",
-        "model/criterion/measures.rs",
-        "model/criterion/ttc.rs",
-        "model/driver/fsm.rs",
-    ];
-    assert_eq!(files, named.map(PathBuf::from));
-    let architecture = fs::read_to_string(src.join("../ARCHITECTURE.md")).unwrap();
-    assert!(
-        architecture
-            .contains("The only division is `exact_div`: in the FSM's demand, in a sampled case's times, in the BTN")
-    );
-}

@@ -2,27 +2,15 @@
 
 use std::collections::HashMap;
 use std::path::Path;
-use std::process::{Command, Output};
 
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::reader::Reader;
 
-fn lanesweep(dir: &Path, args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_lanesweep")).current_dir(dir).args(args).output().unwrap()
-}
-
-fn good(dir: &Path, args: &[&str]) -> String {
-    let output = lanesweep(dir, args);
-    assert_eq!(output.status.code(), Some(0), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
-}
+use crate::common::program::{done as good, flat, lanesweep};
 
 fn refused(dir: &Path, args: &[&str], status: i32, says: &str) {
-    let output = lanesweep(dir, args);
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(status), "{args:?}: {said}");
-    let joined = said.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
-    assert!(joined.contains(says), "{args:?}: {joined}");
+    let (code, _, said) = lanesweep(dir, args);
+    assert!(code == status && flat(&said).contains(says), "{args:?}: {code} {said}");
 }
 
 /// An element of a document with the names above it.

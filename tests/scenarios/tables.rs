@@ -2,16 +2,15 @@
 //! make themselves is read, or refused with file, row and column.
 #![cfg(feature = "parquet")]
 
+use crate::common::mined::fitted;
 use crate::common::program::{ran, refused, said};
 use crate::common::tables::made;
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use lanesweep::scenario::DataProvenance;
-use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Ego, Other, Scenario, Side, read_scenarios, write_scenarios, write_scenarios_to};
-use lanesweep::stats::density::{DensityModel, FitOptions, write_density};
+use lanesweep::stats::density::write_density;
 use lanesweep::support::plausibility::LIMITS;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
@@ -131,10 +130,7 @@ fn sampled_rows_are_the_same_in_every_format() {
     let dir = tempfile::tempdir().unwrap();
     let at = dir.path();
     let lvd: Vec<Scenario> = synthetic().into_iter().filter(|s| s.category == Category::Lvd && s.kept).collect();
-    let facts = DataProvenance { data: "made".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
-    let options = FitOptions { valid_draws: 200, ..FitOptions::default() };
-    let id = Parameterization::find(Category::Lvd, "i").unwrap();
-    write_density(&at.join("d.json"), &DensityModel::fit(id, &lvd, &facts, &options).unwrap().model).unwrap();
+    write_density(&at.join("d.json"), &fitted(&lvd, Category::Lvd, "i", false)).unwrap();
     for (name, threads) in [("r.csv", "2"), ("r.jsonl", "2"), ("r.parquet", "2"), ("again.parquet", "1")] {
         let sample = "-q sample d.json --samples 300 --thw 0.6,1.2 --backend cpu";
         ran(at, &format!("{sample} --rows {name} --threads {threads}"));

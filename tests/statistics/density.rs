@@ -2,6 +2,7 @@
 //! point and on to a case.
 
 use crate::common;
+use crate::common::mined::mined;
 
 use std::sync::OnceLock;
 
@@ -16,8 +17,6 @@ use lanesweep::stats::density::{
     normal_cdf, read_density, write_density,
 };
 use lanesweep::stats::random::Stream;
-use lanesweep::traffic::mining::{MiningOptions, mine_generated};
-use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 use rayon::prelude::*;
 use serde_json::Value;
 
@@ -166,10 +165,7 @@ fn a_density_that_cannot_be_told_is_refused_with_the_reason() {
 /// Kept scenarios of all categories, mined from generated recordings.
 fn scenarios() -> &'static [Scenario] {
     static MINED: OnceLock<Vec<Scenario>> = OnceLock::new();
-    MINED.get_or_init(|| {
-        let generator = GeneratorOptions { recordings: 4, ..GeneratorOptions::default() };
-        mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap().scenarios
-    })
+    MINED.get_or_init(|| mined(4).scenarios)
 }
 
 fn kept(category: Category) -> Vec<&'static Scenario> {

@@ -2,23 +2,19 @@
 
 use std::sync::OnceLock;
 
+use crate::common::mined::{mined, provenance};
+
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{SampleSource, generator_of};
-use lanesweep::scenario::DataProvenance;
 use lanesweep::scenario::parameterization::{
     Parameterization, ParameterizationOptions, ReducedScenario, Reduction, SeriesScale, SvdBasis, SvdLateral, fit_svd,
 };
 use lanesweep::scenario::{Category, Scenario, Side};
 use lanesweep::stats::density::{DensityModel, FitOptions};
-use lanesweep::traffic::mining::{MiningOptions, mine_generated};
-use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
 fn scenarios() -> &'static [Scenario] {
     static MINED: OnceLock<Vec<Scenario>> = OnceLock::new();
-    MINED.get_or_init(|| {
-        let generator = GeneratorOptions { recordings: 8, ..GeneratorOptions::default() };
-        mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap().scenarios
-    })
+    MINED.get_or_init(|| mined(8).scenarios)
 }
 
 fn kept(category: Category) -> Vec<&'static Scenario> {
@@ -30,10 +26,8 @@ fn options(svd_lateral: SvdLateral) -> ParameterizationOptions {
 }
 
 fn density(id: Parameterization, parameterization: ParameterizationOptions) -> DensityModel {
-    let facts =
-        DataProvenance { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
     let fit = FitOptions { parameterization, valid_draws: 20_000, ..FitOptions::default() };
-    DensityModel::fit(id, scenarios(), &facts, &fit).unwrap().model
+    DensityModel::fit(id, scenarios(), &provenance(), &fit).unwrap().model
 }
 
 /// The fraction of draws that are refused because of where the target starts or ends.
@@ -103,10 +97,9 @@ fn a_recorded_scenario_that_starts_in_the_ego_s_lane_keeps_its_kernel() {
     let mut some: Vec<Scenario> = kept(Category::CutIn).into_iter().cloned().collect();
     // The lane change began before the ego's data set.
     some[0].target.y.iter_mut().for_each(|y| *y *= 0.1);
-    let facts = DataProvenance { data: String::new(), synthetic: true, scenarios_sha256: String::new(), driven: None };
     let fit = FitOptions { valid_draws: 1000, ..FitOptions::default() };
     let id = Parameterization::find(Category::CutIn, "7").unwrap();
-    let fitted = DensityModel::fit(id, &some, &facts, &fit).unwrap();
+    let fitted = DensityModel::fit(id, &some, &provenance(), &fit).unwrap();
     assert_eq!((fitted.left_out.len(), fitted.model.kde.points().len()), (0, some.len()));
     assert!(!fitted.model.space.is_valid(&fitted.model.kde.points()[0]), "a draw at that place is refused");
 }

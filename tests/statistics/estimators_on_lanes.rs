@@ -4,6 +4,7 @@
 //! two cores; LANESWEEP_DLR_HT names a folder of DLR-HT recordings in highD's format).
 
 use crate::common;
+use crate::common::mined::provenance;
 
 use std::path::PathBuf;
 
@@ -12,7 +13,6 @@ use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{Estimator, LaneLimitState, Question, Sample, SampleHeadways, SampleOptions, truncated};
-use lanesweep::scenario::DataProvenance;
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::{DensityModel, FitOptions, read_density};
@@ -23,11 +23,9 @@ use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 const LEVEL: f64 = 0.999;
 
 fn density(id: Parameterization, scenarios: &[Scenario]) -> DensityModel {
-    let facts =
-        DataProvenance { data: "mined".to_owned(), synthetic: false, scenarios_sha256: String::new(), driven: None };
     // P_valid must be known better than the probabilities: it is in no interval.
     let options = FitOptions { valid_draws: 4_000_000, ..FitOptions::default() };
-    DensityModel::fit(id, scenarios, &facts, &options).unwrap().model
+    DensityModel::fit(id, scenarios, &provenance(), &options).unwrap().model
 }
 
 fn crude(density: &DensityModel, profile: &Profile, model: ModelId, thw_s: f64, samples: u64) -> Estimate {

@@ -1,59 +1,32 @@
 //! `lanesweep fit` as its users run it.
 
-use crate::common;
-
-use std::path::Path;
-use std::process::Output;
-
-use assert_cmd::Command;
-use lanesweep::scenario::{Category, read_scenarios, write_scenarios};
+use lanesweep::scenario::{Category, Scenario, read_scenarios, write_scenarios};
 use lanesweep::stats::density::read_density;
 
-fn lanesweep(args: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_lanesweep"));
-    command.env("NO_COLOR", "1").args(args).output().unwrap()
-}
+use crate::common;
+use crate::common::program::{ran, refused, said};
 
-fn code(output: &Output) -> i32 {
-    output.status.code().expect("the program ended by itself")
-}
-
-fn stderr(output: &Output) -> String {
-    // The drawing breaks long lines.
-    String::from_utf8_lossy(&output.stderr).split_whitespace().collect::<Vec<_>>().join(" ")
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().unwrap()
-}
-
-const SMALL: [&str; 4] = ["--synth-recordings", "3", "--config", "generator.duration_s=200"];
+const SMALL: &str = "--synth-recordings 3 --config generator.duration_s=200";
 
 #[test]
 fn recordings_their_scenario_file_and_the_generator_give_the_same_densities() {
     let dir = tempfile::tempdir().unwrap();
-    let [data, a, b, c] = ["data", "a", "b", "c"].map(|name| dir.path().join(name));
-    let scenarios = dir.path().join("scenarios.jsonl");
-    let run = |args: &[&str]| {
-        let output = lanesweep(args);
-        assert_eq!(code(&output), 0, "{}", stderr(&output));
-        String::from_utf8(output.stdout).unwrap()
-    };
-    run(&[&["-q", "synth", text(&data)], &SMALL[..]].concat());
-    let wanted = ["--parameterizations", "2,e,i"];
-    let printed = run(&[&["-q", "fit", "--out", text(&a)], &wanted[..], &SMALL[..]].concat());
-    run(&[&["-q", "fit", text(&data), "--out", text(&b), "--threads", "1"], &wanted[..]].concat());
-    run(&["-q", "mine", text(&data), "--out", text(&scenarios)]);
-    run(&[&["-q", "fit", "--scenarios", text(&scenarios), "--out", text(&c), "--threads", "3"], &wanted[..]].concat());
+    let dir = dir.path();
+    ran(dir, &format!("-q synth data {SMALL}"));
+    let wanted = "--parameterizations 2,e,i";
+    let printed = ran(dir, &format!("-q fit --out a {wanted} {SMALL}"));
+    ran(dir, &format!("-q fit data --out b --threads 1 {wanted}"));
+    ran(dir, "-q mine data --out scenarios.jsonl");
+    ran(dir, &format!("-q fit --scenarios scenarios.jsonl --out c --threads 3 {wanted}"));
     for word in ["SYNTHETIC DATA", "no number above is a statement about real traffic", "lateral_speed_mps", "P_valid"]
     {
         assert!(printed.contains(word), "{word}: {printed}");
     }
     for name in ["cut-in-2.json", "cut-out-e.json", "lvd-i.json"] {
-        let read = |dir: &Path| std::fs::read(dir.join(name)).unwrap();
-        assert!(read(&a) == read(&b), "{name}: generated against written recordings");
-        assert!(read(&b) == read(&c), "{name}: recordings against the scenario file");
-        let model = read_density(&a.join(name)).unwrap();
+        let [a, b, c] = ["a", "b", "c"].map(|out| std::fs::read(dir.join(out).join(name)).unwrap());
+        assert!(a == b, "{name}: generated against written recordings");
+        assert!(b == c, "{name}: recordings against the scenario file");
+        let model = read_density(&dir.join("a").join(name)).unwrap();
         assert!(model.provenance.synthetic && model.provenance.data.contains("SYNTHETIC"));
         let exposure = model.exposure.expect("recordings tell what was driven");
         assert!(exposure.per_hour.is_some() && exposure.per_kilometre.is_some());
@@ -64,40 +37,31 @@ fn recordings_their_scenario_file_and_the_generator_give_the_same_densities() {
 #[test]
 fn what_was_driven_comes_with_the_mined_file_from_flags_or_is_unknown() {
     let dir = tempfile::tempdir().unwrap();
-    let [data, out] = ["data", "out.json"].map(|name| dir.path().join(name));
-    let scenarios = dir.path().join("scenarios.jsonl");
-    assert_eq!(code(&lanesweep(&[&["-q", "synth", text(&data)], &SMALL[..]].concat())), 0);
-    assert_eq!(code(&lanesweep(&["-q", "mine", text(&data), "--out", text(&scenarios)])), 0);
-    let fit = |more: &[&str]| {
-        let args = ["fit", "--scenarios", text(&scenarios), "--parameterizations", "3"];
-        lanesweep(&[&args, &["--out", text(&out)][..], more].concat())
-    };
-    let beside = dir.path().join("scenarios.exposure.json");
-    let mined = fit(&[]);
-    assert_eq!(code(&mined), 0, "{}", stderr(&mined));
-    let driven = read_density(&out).unwrap().exposure.unwrap().driven;
+    let dir = dir.path();
+    ran(dir, &format!("-q synth data {SMALL}"));
+    ran(dir, "-q mine data --out scenarios.jsonl");
+    let fit = "fit --scenarios scenarios.jsonl --parameterizations 3 --out out.json";
+    let exposure = || read_density(&dir.join("out.json")).unwrap().exposure;
+    ran(dir, fit);
+    let driven = exposure().unwrap().driven;
     // Three recordings of 200 s with some ten vehicles in view at a time, at some 30 m/s.
     let (hours, kilometres) = (driven.hours.unwrap(), driven.kilometres.unwrap());
     assert!((0.5..20.0).contains(&hours) && (60.0..140.0).contains(&(kilometres / hours)), "{hours} {kilometres}");
 
-    let typed = fit(&["--hours", "44.5"]);
-    assert_eq!(code(&typed), 0, "{}", stderr(&typed));
-    let exposure = read_density(&out).unwrap().exposure.unwrap();
-    assert_eq!((exposure.driven.hours, exposure.driven.kilometres), (Some(44.5), None));
-    assert!(exposure.per_kilometre.is_none());
+    ran(dir, &format!("{fit} --hours 44.5"));
+    let typed = exposure().unwrap();
+    assert_eq!((typed.driven.hours, typed.driven.kilometres), (Some(44.5), None));
+    assert!(typed.per_kilometre.is_none());
 
-    let appended = std::fs::read_to_string(&scenarios).unwrap() + "\n";
-    std::fs::write(&scenarios, appended).unwrap();
-    let other = fit(&[]);
-    assert_eq!(code(&other), 3, "{}", stderr(&other));
-    assert!(stderr(&other).contains("belongs to other scenarios"), "{}", stderr(&other));
+    let appended = std::fs::read_to_string(dir.join("scenarios.jsonl")).unwrap() + "\n";
+    std::fs::write(dir.join("scenarios.jsonl"), appended).unwrap();
+    refused(dir, fit, 3, "belongs to other scenarios");
 
-    std::fs::remove_file(&beside).unwrap();
-    let unknown = fit(&[]);
-    assert_eq!(code(&unknown), 0, "{}", stderr(&unknown));
-    assert!(stderr(&unknown).contains("give --hours and --km"), "{}", stderr(&unknown));
-    assert!(String::from_utf8_lossy(&unknown.stdout).contains("exposure   unknown"));
-    assert!(read_density(&out).unwrap().exposure.is_none());
+    std::fs::remove_file(dir.join("scenarios.exposure.json")).unwrap();
+    let (code, text) = said(dir, fit);
+    assert!(code == 0 && text.contains("give --hours and --km"), "{code} {text}");
+    assert!(ran(dir, fit).contains("exposure   unknown"));
+    assert!(exposure().is_none());
 }
 
 #[test]
@@ -108,11 +72,9 @@ fn sets_that_make_no_density_are_told_apart() {
     let mut lvd: Vec<_> = scenarios.into_iter().filter(|s| s.category == Category::Lvd).collect();
     lvd.iter_mut().for_each(|s| s.kept = true);
     assert!((4..6).contains(&lvd.len()), "{}", lvd.len());
-    let out = dir.path().join("out");
-    let fit = |name: &str, set: &[lanesweep::scenario::Scenario], key: &str| {
-        let path = dir.path().join(name);
-        write_scenarios(&path, set).unwrap();
-        lanesweep(&["fit", "--scenarios", text(&path), "--parameterizations", key, "--out", text(&out)])
+    let fit = |set: &[Scenario], key: &str| {
+        write_scenarios(&dir.path().join("set.jsonl"), set).unwrap();
+        said(dir.path(), &format!("fit --scenarios set.jsonl --parameterizations {key} --out out"))
     };
     let mut dropped = lvd.clone();
     dropped.iter_mut().for_each(|s| s.kept = false);
@@ -123,62 +85,48 @@ fn sets_that_make_no_density_are_told_apart() {
         let last = scenario.target.v.len() - 1;
         scenario.target.v[last] = 1.0 + 0.1 * k as f64;
     }
-    for (name, set, key, hint) in [
-        ("none", &dropped[..], "i", "passed the filters"),
-        ("one", &lvd[..1], "i", "1 scenario cannot tell a density of 3 parameters"),
-        ("few", &lvd[..3], "i", "3 scenarios cannot tell a density of 3 parameters"),
-        ("same", &same[..], "i", "`v0_mps`"),
-        ("svd", &lvd[..3], "v", "too few for a decomposition"),
+    for (set, key, hint) in [
+        (&dropped[..], "i", "passed the filters"),
+        (&lvd[..1], "i", "1 scenario cannot tell a density of 3 parameters"),
+        (&lvd[..3], "i", "3 scenarios cannot tell a density of 3 parameters"),
+        (&same[..], "i", "`v0_mps`"),
+        (&lvd[..3], "v", "too few for a decomposition"),
     ] {
-        let output = fit(name, set, key);
-        assert_eq!(code(&output), 3, "{name}: {}", stderr(&output));
-        assert!(stderr(&output).contains(hint), "{name} should say `{hint}`: {}", stderr(&output));
-        assert!(output.stdout.is_empty() && !out.exists(), "{name}: nothing may be written");
+        let (code, text) = fit(set, key);
+        assert!(code == 3 && text.contains(hint), "should say `{hint}`: {code} {text}");
+        assert!(!dir.path().join("out").exists(), "{hint}: nothing may be written");
     }
     // A category without scenarios is told once, with what there is.
-    let empty = fit("empty", &lvd, "a,b,c,i");
-    let said = stderr(&empty);
-    assert_eq!((code(&empty), said.matches("there is no such scenario").count()), (4, 1), "{said}");
-    assert!(said.contains("cut-out: there is no such scenario") && said.contains("--categories lvd"), "{said}");
+    let (code, text) = fit(&lvd, "a,b,c,i");
+    assert_eq!((code, text.matches("there is no such scenario").count()), (4, 1), "{text}");
+    assert!(text.contains("cut-out: there is no such scenario") && text.contains("--categories lvd"), "{text}");
     // What can be fitted is, and the exit status says that something is missing.
-    let some = fit("some", &lvd, "i,v");
-    assert_eq!(code(&some), 4, "{}", stderr(&some));
-    assert!(stderr(&some).contains("too few for a decomposition"), "{}", stderr(&some));
-    assert!(out.join("lvd-i.json").exists() && !out.join("lvd-v.json").exists());
+    let (code, text) = fit(&lvd, "i,v");
+    assert!(code == 4 && text.contains("too few for a decomposition"), "{code} {text}");
+    assert!(dir.path().join("out/lvd-i.json").exists() && !dir.path().join("out/lvd-v.json").exists());
 }
 
 #[test]
 fn wrong_words_are_answered_with_what_to_write_instead() {
     let dir = tempfile::tempdir().unwrap();
-    let scenarios = common::golden("paper_sumo_01_02_scenarios.jsonl");
-    let file = dir.path().join("one.json");
-    let cases: [(&[&str], i32, &str); 11] = [
-        (&["fit", "--config", "fit.valid_draws=0"], 2, "expected a whole number from 1 to 1000000000"),
-        (&["fit", "--config", "fit.valid_draws=1000000001"], 2, "expected a whole number from 1 to 1000000000"),
-        (&["fit", "--parameterizations", "9"], 2, "there is no parameterization `9`"),
-        (&["fit", "--parameterizations", "9"], 2, "LVD: i ii iii iv v"),
-        (&["fit", "--categories", "cut-in", "--parameterizations", "ii"], 2, "of cut-in"),
-        (&["fit", "--categories", "cutin"], 2, "use cut-in, cut-out, lvd"),
-        (&["fit", "--config", "fit.bandwidth_rule=best"], 2, "reduction"),
-        (&["fit", "--hours", "-1"], 2, "--hours"),
-        (&["fit", "--km", "nan"], 2, "--km"),
-        (&["fit", "--out", text(&file)], 2, "is one file, but 19 densities"),
-        (&["fit", "--scenarios", "no-such-file.jsonl"], 6, "no-such-file.jsonl"),
-    ];
-    for (args, expected, hint) in cases {
-        let output = lanesweep(args);
-        let said = stderr(&output);
-        assert_eq!(code(&output), expected, "{args:?}: {said}");
-        let said = said.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
-        assert!(said.contains(hint), "{args:?} should say `{hint}`: {said}");
-        assert!(!said.contains("panicked"), "{args:?}: {said}");
+    std::fs::copy(common::golden("paper_sumo_01_02_scenarios.jsonl"), dir.path().join("input.json")).unwrap();
+    for (flags, code, hint) in [
+        ("--config fit.valid_draws=0", 2, "expected a whole number from 1 to 1000000000"),
+        ("--config fit.valid_draws=1000000001", 2, "expected a whole number from 1 to 1000000000"),
+        ("--parameterizations 9", 2, "there is no parameterization `9`"),
+        ("--parameterizations 9", 2, "LVD: i ii iii iv v"),
+        ("--categories cut-in --parameterizations ii", 2, "of cut-in"),
+        ("--categories cutin", 2, "use cut-in, cut-out, lvd"),
+        ("--config fit.bandwidth_rule=best", 2, "reduction"),
+        ("--hours -1", 2, "--hours"),
+        ("--km nan", 2, "--km"),
+        ("--out one.json", 2, "is one file, but 19 densities"),
+        ("--scenarios no-such-file.jsonl", 6, "no-such-file.jsonl"),
+        ("--scenarios input.json --parameterizations i --out input.json", 2, "would be overwritten"),
+    ] {
+        refused(dir.path(), &format!("fit {flags}"), code, hint);
     }
-    let input = dir.path().join("input.json");
-    std::fs::copy(&scenarios, &input).unwrap();
-    let over = lanesweep(&["fit", "--scenarios", text(&input), "--parameterizations", "i", "--out", text(&input)]);
-    assert_eq!(code(&over), 2, "{}", stderr(&over));
-    assert!(stderr(&over).contains("would be overwritten"), "{}", stderr(&over));
-    let help = String::from_utf8(lanesweep(&["fit", "--help"]).stdout).unwrap();
+    let help = ran(dir.path(), "fit --help");
     assert!(help.starts_with("How are the parameters of scenarios distributed?"), "{help}");
     assert!(help.contains("lanesweep fit recordings --out densities"), "{help}");
 }

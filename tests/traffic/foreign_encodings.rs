@@ -5,18 +5,12 @@ use std::io::Write;
 use std::path::Path;
 
 use lanesweep::support::plausibility::Implausible;
-use lanesweep::traffic::mining::{MiningOptions, mine_folder};
-use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
 use lanesweep::traffic::trajectory::highd;
 use lanesweep::traffic::trajectory::tracks::{self, Preset, TrackFile};
 use lanesweep::traffic::trajectory::{Inputs, Recording};
 
 use crate::common::exid::Plain;
-
-fn generated() -> Recording {
-    let options = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
-    generate_one(&options, 0).unwrap()
-}
+use crate::tracks::generated;
 
 fn table() -> Plain {
     Plain::of(&generated(), 5)
@@ -97,18 +91,6 @@ fn compressed_and_utf_16_texts_are_read() {
     let cut = packed(&text);
     let error = read("own.csv.gz", &cut[..cut.len() / 2]).unwrap_err();
     assert_eq!(error.help().as_deref(), Some("the file is truncated: copy it again"), "{error}");
-}
-
-#[test]
-fn a_compressed_file_beside_itself_counts_once() {
-    let dir = tempfile::tempdir().unwrap();
-    let text = table().text();
-    fs::write(dir.path().join("a.csv"), &text).unwrap();
-    fs::write(dir.path().join("a.csv.gz"), packed(&text)).unwrap();
-    fs::write(dir.path().join("b.csv.gz"), packed(&text)).unwrap();
-    let mined = mine_folder(dir.path(), &MiningOptions::default(), Implausible::Refused, || Ok(())).unwrap();
-    assert_eq!((mined.recordings.len(), mined.problems.len()), (2, 1));
-    assert!(mined.problems[0].to_string().contains("recording a: another file"), "{:?}", mined.problems);
 }
 
 #[test]
@@ -227,35 +209,33 @@ fn geographic_coordinates_are_named_as_such() {
 fn parquet_with_gzip_or_lz4_and_instants_is_the_table() {
     use std::sync::Arc;
 
-    use arrow_array::{ArrayRef, Float64Array, RecordBatch, StringArray, TimestampMicrosecondArray};
-    use parquet::arrow::ArrowWriter;
+    use arrow_array::{ArrayRef, Float64Array, StringArray, TimestampMicrosecondArray};
     use parquet::basic::{Compression, GzipLevel};
-    use parquet::file::properties::WriterProperties;
 
     let table = table();
     let right = from_frame_0(read("own.csv", table.text().as_bytes()).unwrap());
-    let column = |name: &String| {
+    let column = |name: &String| -> ArrayRef {
         let at = table.at(name);
         let texts = || table.rows.iter().map(move |row| row[at].as_str());
         let numbers = || texts().map(|text| text.parse::<f64>().unwrap());
-        let array: ArrayRef = match name.as_str() {
+        match name.as_str() {
             "class" | "track_id" => Arc::new(StringArray::from_iter_values(texts())),
             "t" => {
                 let instants = numbers().map(|t| 1_740_823_200_000_000 + (1e6 * t).round() as i64);
                 Arc::new(TimestampMicrosecondArray::from_iter_values(instants))
             }
             _ => Arc::new(Float64Array::from_iter_values(numbers())),
-        };
-        (name.clone(), array)
+        }
     };
-    let batch = RecordBatch::try_from_iter(table.header.iter().map(column)).unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("own.parquet");
     for codec in [Compression::GZIP(GzipLevel::default()), Compression::LZ4, Compression::LZ4_RAW, Compression::SNAPPY]
     {
-        let mut bytes = Vec::new();
-        let properties = WriterProperties::builder().set_compression(codec).build();
-        let mut writer = ArrowWriter::try_new(&mut bytes, batch.schema(), Some(properties)).unwrap();
-        writer.write(&batch).unwrap();
-        writer.close().unwrap();
-        assert!(from_frame_0(read("own.parquet", &bytes).unwrap()) == right, "{codec:?}");
+        crate::common::tables::made::write(
+            &path,
+            table.header.iter().map(|name| (name.as_str(), column(name))).collect(),
+            codec,
+        );
+        assert!(from_frame_0(read("own.parquet", &fs::read(&path).unwrap()).unwrap()) == right, "{codec:?}");
     }
 }

@@ -12,10 +12,10 @@ use lanesweep::traffic::trajectory::tracks::{self, Finding, LoadedTracks, Unders
 use lanesweep::traffic::trajectory::{Inputs, Loaded, Track, VehicleClass};
 
 use crate::common::exid::{self, Plain};
-use crate::tracks::{fact, says};
+use crate::tracks::{fact, generated, says};
 
 fn table() -> Plain {
-    table_of(GeneratorOptions::default().seed)
+    Plain::of(&generated(), 5)
 }
 
 fn table_of(seed: u64) -> Plain {
@@ -145,8 +145,7 @@ fn one_speed_that_cannot_be_is_refused_by_vehicle_and_frame() {
 /// A small error of one speed is no contradiction to the positions, but the braking that it tells is none of a vehicle.
 #[test]
 fn a_peak_of_one_sample_beyond_what_is_physical_is_refused() {
-    let options = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
-    let mut recording = generate_one(&options, 0).unwrap();
+    let mut recording = generated();
     recording.tracks.truncate(60);
     let mut table = Plain::of(&recording, 1).without(&["heading", "speed"]);
     let (vx, row) = (table.at("vx"), 300);
@@ -302,8 +301,7 @@ fn load(path: &Path) -> Vec<Loaded> {
 #[test]
 fn a_meta_file_names_a_vehicle_as_a_number_however_it_is_written() {
     let dir = tempfile::tempdir().unwrap();
-    let options = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
-    let mut recording = generate_one(&options, 0).unwrap();
+    let mut recording = generated();
     recording.tracks.truncate(60);
     exid::write(dir.path(), &recording, f64::INFINITY);
     let file = dir.path().join(format!("{}_tracksMeta.csv", recording.id));

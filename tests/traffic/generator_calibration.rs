@@ -215,40 +215,6 @@ fn the_default_recordings_hold_enough_scenarios_at_the_stated_factor() {
     ]);
 }
 
-#[test]
-fn recorded_motions_are_neither_straight_lines_nor_sinusoids() {
-    let counted = Counted::of(&some_of_the_default());
-    let mut table = Table::new("What parameterizations with few numbers cannot reproduce");
-    // Deviation of the recorded speed from the straight line between its ends.
-    let bend = |v: &[f64]| {
-        let n = (v.len() - 1) as f64;
-        let line = |k: usize| v[0] + (v[v.len() - 1] - v[0]) * k as f64 / n;
-        (0..v.len()).map(|k| (v[k] - line(k)).abs()).fold(0.0, f64::max)
-    };
-    let bends = |category| counted.kept(category).map(|s| bend(&s.target.v)).collect::<Vec<_>>();
-    table.row("cut-in: largest bend of the speed, median, m/s", "", quantile(&bends(Category::CutIn), 0.5), 0.05, 2.0);
-    table.row(
-        "cut-out: largest bend of the speed, median, m/s",
-        "",
-        quantile(&bends(Category::CutOut), 0.5),
-        0.05,
-        2.0,
-    );
-    table.row("LVD: largest bend of the speed, median, m/s", "", quantile(&bends(Category::Lvd), 0.5), 0.2, 3.0);
-    let sinusoid = |v: &[f64]| {
-        let n = (v.len() - 1) as f64;
-        let drop = v[0] - v[v.len() - 1];
-        let curve = |k: usize| v[0] - 0.5 * drop * (1.0 - (std::f64::consts::PI * k as f64 / n).cos());
-        (0..v.len()).map(|k| (v[k] - curve(k)).abs()).fold(0.0, f64::max)
-    };
-    let off: Vec<f64> = counted.kept(Category::Lvd).map(|s| sinusoid(&s.target.v)).collect();
-    table.row("LVD: largest distance from the sinusoid, median, m/s", "", quantile(&off, 0.5), 0.2, 3.0);
-    let lasting: Vec<f64> = counted.kept(Category::Lvd).map(|s| s.duration_s()).collect();
-    table.row("LVD: duration, 5 %, s", "", quantile(&lasting, 0.05), 0.5, 2.5);
-    table.row("LVD: duration, 95 %, s", "", quantile(&lasting, 0.95), 4.0, 15.0);
-    table.finish();
-}
-
 /// The shares of failures of S to which the generator is fitted, on a seed that the fit has not seen: all but
 /// one within 3 points or a factor 1.5 of the published one, whichever is more.
 #[test]

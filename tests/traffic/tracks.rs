@@ -415,31 +415,21 @@ fn in_format_of(preset: &Preset, recording: &Recording, stride: usize, mistake: 
 /// A table as Parquet.
 #[cfg(feature = "parquet")]
 fn write_parquet(path: &Path, text: &str, vehicle: &str) {
-    use lanesweep::support::table::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter};
+    use arrow_array::{ArrayRef, Float64Array, Int64Array, StringArray};
     let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
     let names = lines.next().unwrap();
     let rows: Vec<Vec<&str>> = lines.collect();
-    let kinds: Vec<ColumnKind> = names
-        .iter()
-        .zip(&rows[0])
-        .map(|(name, first)| match first.parse::<f64>() {
-            _ if *name == vehicle => ColumnKind::Whole,
-            Err(_) => ColumnKind::Text,
-            Ok(_) => ColumnKind::Binary64,
-        })
-        .collect();
-    let columns = names.iter().zip(&kinds);
-    let columns = columns.map(|(name, kind)| Column { kind: *kind, ..Column::from((*name).to_owned()) }).collect();
-    let mut table = TableWriter::create(path, TableFormat::Parquet, columns, &TableMetadata::default()).unwrap();
-    for row in &rows {
-        let cell = |(text, kind): (&&str, &ColumnKind)| match kind {
-            ColumnKind::Whole => Cell::Whole(text.parse().unwrap()),
-            ColumnKind::Binary64 => Cell::Number(text.parse().unwrap()),
-            _ => Cell::text((*text).to_owned()),
-        };
-        table.row(&row.iter().zip(&kinds).map(cell).collect::<Vec<_>>()).unwrap();
-    }
-    table.finish().unwrap();
+    let column = |at: usize, name: &str| -> ArrayRef {
+        let texts = || rows.iter().map(move |row| row[at]);
+        let numbers = || texts().map(|text| text.parse::<f64>().unwrap());
+        match rows[0][at].parse::<f64>() {
+            _ if name == vehicle => std::sync::Arc::new(Int64Array::from_iter_values(numbers().map(|id| id as i64))),
+            Err(_) => std::sync::Arc::new(StringArray::from_iter_values(texts())),
+            Ok(_) => std::sync::Arc::new(Float64Array::from_iter_values(numbers())),
+        }
+    };
+    let columns = names.iter().enumerate().map(|(at, name)| (*name, column(at, name))).collect();
+    crate::common::tables::made::write(path, columns, parquet::basic::Compression::SNAPPY);
 }
 
 /// Every preset reads traffic in its own format, and finds the usual mistakes in it.
