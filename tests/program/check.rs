@@ -30,16 +30,20 @@ fn json(case: &str) -> Value {
     serde_json::from_str(&out).unwrap()
 }
 
-/// A case, the status of its answer, what the sheet says, and what it does not say.
-type Sheet = (&'static str, i32, &'static [&'static str], &'static [&'static str]);
-
-fn agree(sheets: &[Sheet]) {
-    for (case, status, says, never) in sheets {
-        let (code, out, error) = run(case);
-        assert_eq!(code, *status, "{case}: {out} {error}");
-        let said = flat(&out);
-        says.iter().for_each(|words| assert!(said.contains(words), "{case}: no `{words}` in {out}"));
-        never.iter().for_each(|words| assert!(!said.contains(words), "{case}: `{words}` in {out}"));
+/// Per case its arguments and the status of its answer, then what the sheet says (`+`) and what it does not say (`-`).
+fn agree(sheets: &str) {
+    let mut sheet = (String::new(), String::new());
+    for line in sheets.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#')) {
+        if let Some(words) = line.strip_prefix("+ ") {
+            assert!(sheet.1.contains(words), "{}: no `{words}` in {}", sheet.0, sheet.1);
+        } else if let Some(words) = line.strip_prefix("- ") {
+            assert!(!sheet.1.contains(words), "{}: `{words}` in {}", sheet.0, sheet.1);
+        } else {
+            let (case, status) = line.rsplit_once(" = ").unwrap();
+            let (code, out, error) = run(case);
+            assert_eq!(code.to_string(), status, "{case}: {out} {error}");
+            sheet = (case.to_owned(), flat(&out));
+        }
     }
 }
 
@@ -48,133 +52,118 @@ fn every_answer_has_its_own_exit_status_and_the_sheet_begins_with_the_case_in_km
     let (_, out, _) = run("cut-in 108 72 36 1");
     let case = "cut-in under un-r157 (TTC ≤ 2 s): ego 108 km/h, other vehicle 72 km/h, gap 36 m, across 1 m/s";
     assert_eq!(out.lines().next().unwrap(), case);
-    agree(&[
-        ("cut-in 108 72 36 1", 0, &["preventable under un-r157: CCHDM and FSM avoid the collision"], &[]),
-        ("cut-in 108 36 20 2", 1, &["not preventable under un-r157: CCHDM and FSM collide"], &[]),
-        // Equal speeds, a faster vehicle, one that the ego has passed.
-        ("cut-in 60 60 12 1", 9, &["no conflict under un-r157: nothing collides even if the ego never reacts"], &[]),
-        ("cut-in 60 70 12 1", 9, &["no conflict under un-r157: "], &[]),
-        ("cut-in 60 0 12 1", 9, &["no conflict under un-r157: "], &[]),
-        // An ego that never reacts misses the cutter; CCHDM brakes, stays beside it, and is hit.
-        (
-            "cut-in 130 60 93 0.3",
-            8,
-            &["undecided under un-r157: an ego that never reacts does not collide; CCHDM reacts and collides"],
-            &[],
-        ),
-        // 0.2 km/h over 15 m are 270 s; 0.01 m/s over 30 m is a matter of 50 minutes.
-        (
-            "cut-in 40.2 40 15 1",
-            8,
-            &["undecided under un-r157: no contact within the 120 s of a run, at whose end the gap still closes"],
-            &["robust: no change"],
-        ),
-        (
-            "lvd --ego-speed 30m/s --thw 1 --acceleration -5 --end-speed 29.99m/s --profiles paper",
-            8,
-            &["undecided under paper: no contact within", "at whose end the gap still closes"],
-            &[],
-        ),
-        // FSM stops at the leader: its gap of 3 cm at the shipped step is 0.2 cm at a tenth of it.
-        (
-            "cut-in 60 20 22 1.2",
-            8,
-            &[
-                "undecided under un-r157: ",
-                "FSM stops so close that the time step does not tell it from a contact",
-                "| FSM | touches ",
-                "A BTN above 1 does not contradict an avoided collision",
-            ],
-            &[],
-        ),
-        (
-            "cut-in 60 40 15 1 --profiles eu-2022-1426",
-            10,
-            &[
-                "not judged: profile eu-2022-1426 has no reference drivers",
-                "EU 2022/1426, 1.4.2: the system has to avoid the collision (robust)",
-            ],
-            &[],
-        ),
-    ]);
+    agree(
+        "
+        cut-in 108 72 36 1 = 0
+        + preventable under un-r157: CCHDM and FSM avoid the collision
+        cut-in 108 36 20 2 = 1
+        + not preventable under un-r157: CCHDM and FSM collide
+        # Equal speeds, a faster vehicle, one that the ego has passed.
+        cut-in 60 60 12 1 = 9
+        + no conflict under un-r157: nothing collides even if the ego never reacts
+        cut-in 60 70 12 1 = 9
+        + no conflict under un-r157:
+        cut-in 60 0 12 1 = 9
+        + no conflict under un-r157:
+        # An ego that never reacts misses the cutter; CCHDM brakes, stays beside it, and is hit.
+        cut-in 130 60 93 0.3 = 8
+        + undecided under un-r157: an ego that never reacts does not collide; CCHDM reacts and collides
+        # 0.2 km/h over 15 m are 270 s; 0.01 m/s over 30 m is a matter of 50 minutes.
+        cut-in 40.2 40 15 1 = 8
+        + undecided under un-r157: no contact within the 120 s of a run, at whose end the gap still closes
+        - robust: no change
+        lvd --ego-speed 30m/s --thw 1 --acceleration -5 --end-speed 29.99m/s --profiles paper = 8
+        + undecided under paper: no contact within
+        + at whose end the gap still closes
+        # FSM stops at the leader: its gap of 3 cm at the shipped step is 0.2 cm at a tenth of it.
+        cut-in 60 20 22 1.2 = 8
+        + undecided under un-r157:
+        + FSM stops so close that the time step does not tell it from a contact
+        + | FSM | touches
+        + A BTN above 1 does not contradict an avoided collision
+        cut-in 60 40 15 1 --profiles eu-2022-1426 = 10
+        + not judged: profile eu-2022-1426 has no reference drivers
+        + EU 2022/1426, 1.4.2: the system has to avoid the collision (robust)
+        ",
+    );
 }
 
 /// The annex follows at a headway of 2 s, to the error of gap and speed, and starts at equal speeds.
 #[test]
 fn a_case_that_annex_3_does_not_describe_has_its_own_answer_and_the_edge_is_said() {
-    agree(&[
-        (
-            "lvd --ego-speed 60km/h --speed 20km/h --gap 100 --acceleration=-0.01",
-            10,
-            &[
-                "outside Annex 3 under un-r157: the ego is faster than the leader at the start",
-                "LVD under un-r157 (leader beyond 5 m/s², else the delay only): ",
-            ],
-            &[],
-        ),
-        ("lvd --ego-speed 60km/h --speed 59.8km/h --thw 0.5 --acceleration=-8", 10, &["outside Annex 3 "], &[]),
-        ("lvd --ego-speed 60km/h --speed 60km/h --thw 0.5 --acceleration=-8", 1, &["not preventable "], &[]),
-        ("lvd --ego-speed 60km/h --speed 60.2km/h --thw 0.5 --acceleration=-8", 10, &["outside Annex 3 "], &[]),
-        ("cut-out --ego-speed 70km/h --lateral-speed 1.5 --ahead-gap 8 --thw 2.01", 10, &["outside Annex 3 "], &[]),
-        // It needs 1.9 s to clear the path, and covers 32 m in that time.
-        (
-            "cut-out --ego-speed 60km/h --lateral-speed 1 --ahead-gap 20 --thw 1.5",
-            0,
-            &["no such traffic: the vehicle that cuts out drives through the one ahead of it from 1.2 s on"],
-            &[],
-        ),
-        (
-            "cut-out --ego-speed 70km/h --gap 38.8889 --lateral-speed 1.0 --ahead-gap 60",
-            0,
-            // The table of distances names the edge too.
-            &["preventable under un-r157: ", "outside Annex 3"],
-            &["leaves Annex 3", "no such traffic"],
-        ),
-        (
-            "cut-out --ego-speed 70km/h --gap 38.965 --lateral-speed 1.0 --ahead-gap 60",
-            0,
-            &["preventable under un-r157: ", "the case leaves Annex 3 with gap + 1 cm"],
-            &[],
-        ),
-    ]);
+    agree(
+        "
+        lvd --ego-speed 60km/h --speed 20km/h --gap 100 --acceleration=-0.01 = 10
+        + outside Annex 3 under un-r157: the ego is faster than the leader at the start
+        + LVD under un-r157 (leader beyond 5 m/s², else the delay only):
+        lvd --ego-speed 60km/h --speed 59.8km/h --thw 0.5 --acceleration=-8 = 10
+        + outside Annex 3 under un-r157:
+        lvd --ego-speed 60km/h --speed 60km/h --thw 0.5 --acceleration=-8 = 1
+        + not preventable under un-r157:
+        lvd --ego-speed 60km/h --speed 60.2km/h --thw 0.5 --acceleration=-8 = 10
+        + outside Annex 3 under un-r157:
+        cut-out --ego-speed 70km/h --lateral-speed 1.5 --ahead-gap 8 --thw 2.01 = 10
+        + outside Annex 3 under un-r157:
+        # It needs 1.9 s to clear the path, and covers 32 m in that time.
+        cut-out --ego-speed 60km/h --lateral-speed 1 --ahead-gap 20 --thw 1.5 = 0
+        + no such traffic: the vehicle that cuts out drives through the one ahead of it from 1.2 s on
+        # The table of distances names the edge too.
+        cut-out --ego-speed 70km/h --gap 38.8889 --lateral-speed 1.0 --ahead-gap 60 = 0
+        + preventable under un-r157:
+        + outside Annex 3
+        - leaves Annex 3
+        - no such traffic
+        cut-out --ego-speed 70km/h --gap 38.965 --lateral-speed 1.0 --ahead-gap 60 = 0
+        + preventable under un-r157:
+        + the case leaves Annex 3 with gap + 1 cm
+        ",
+    );
 }
 
 /// (a) of 5.2.5.2 is a cutter that keeps its speed; (b) is visible for 0.72 s, and unknown where the case begins within the
 /// lane change; (c) is the TTC at lane intrusion: 0.628 s from 7.2 m, between the EU's threshold and that of R157.
 #[test]
 fn each_clause_has_its_demand_beside_the_drivers() {
-    const NO_SPEED_KEPT: &str = "UN R157, 5.2.5.2: no demand: (a) largest change of the other vehicle's speed is";
-    const UNKNOWN: &str = "UN R157, 5.2.5.2: unknown whether the system has to avoid the collision";
-    const DEMAND: &str = "UN R157, 5.2.5.2: the system has to avoid the collision (robust)";
-    agree(&[
-        ("cut-in 60 45 24 1 --acceleration -5", 1, &[NO_SPEED_KEPT], &["has to avoid the collision (robust)"]),
-        ("cut-in 60 45 24 1", 0, &[DEMAND], &["5.2.5.1"]),
-        ("cut-in 60 40 15 1 --width 2.5", 0, &[DEMAND], &[]),
-        ("cut-in 60 30 24 2", 0, &["preventable ", "that does not mean unavoidable"], &[]),
-        ("cut-in 60 40 15 1 --lateral-distance 2.3", 0, &[UNKNOWN], &["5.2.5.2: no demand"]),
-        ("cut-in 60 40 15 2", 0, &["UN R157, 5.2.5.2: no demand: (b)"], &[]),
-        (
-            "cut-in 60 45 7.2 1 --profiles un-r157,eu-2022-1426,eu-2022-1426-standing",
-            0,
-            &[
-                "UN R157, 5.2.5.2: no demand: (c) TTC at lane intrusion is 0.628 s; the clause applies where it is > 0.6972 s",
-                "EU 2022/1426, 1.4.2: the system has to avoid the collision (robust)",
-                "EU 2022/1426, 1.4.2, standing: no demand: (c)",
-            ],
-            &[],
-        ),
-        // These profiles drop condition (b), so the regulation's clause is not judged.
-        ("cut-in 60 40 15 1 --profiles paper", 0, &["preventable under paper: "], &["5.2.5.2", "lane intrusion"]),
-        ("cut-in 60 40 15 1 --profiles jrc-2021", 0, &["preventable under jrc-2021: "], &["5.2.5.2", "lane intrusion"]),
-        // Each input of the case varies by its own error.
-        (
-            "lvd --ego-speed 60km/h --gap 10 --acceleration=-5",
-            8,
-            &["UN R157, 5.2.5.1 still holds, whatever the drivers of Annex 3 do", "deceleration + 0.05 m/s²"],
-            &[],
-        ),
-        ("cut-in 60 40 15 0.38", 8, &["undecided ", "the answer changes with lateral speed - 0.01 m/s"], &[]),
-    ]);
+    agree(
+        "
+        cut-in 60 45 24 1 --acceleration -5 = 1
+        + UN R157, 5.2.5.2: no demand: (a) largest change of the other vehicle's speed is
+        - has to avoid the collision (robust)
+        cut-in 60 45 24 1 = 0
+        + UN R157, 5.2.5.2: the system has to avoid the collision (robust)
+        - 5.2.5.1
+        cut-in 60 40 15 1 --width 2.5 = 0
+        + UN R157, 5.2.5.2: the system has to avoid the collision (robust)
+        cut-in 60 30 24 2 = 0
+        + preventable under un-r157:
+        + that does not mean unavoidable
+        cut-in 60 40 15 1 --lateral-distance 2.3 = 0
+        + UN R157, 5.2.5.2: unknown whether the system has to avoid the collision
+        - 5.2.5.2: no demand
+        cut-in 60 40 15 2 = 0
+        + UN R157, 5.2.5.2: no demand: (b)
+        cut-in 60 45 7.2 1 --profiles un-r157,eu-2022-1426,eu-2022-1426-standing = 0
+        + UN R157, 5.2.5.2: no demand: (c) TTC at lane intrusion is 0.628 s; the clause applies where it is > 0.6972 s
+        + EU 2022/1426, 1.4.2: the system has to avoid the collision (robust)
+        + EU 2022/1426, 1.4.2, standing: no demand: (c)
+        # These profiles drop condition (b), so the regulation's clause is not judged.
+        cut-in 60 40 15 1 --profiles paper = 0
+        + preventable under paper:
+        - 5.2.5.2
+        - lane intrusion
+        cut-in 60 40 15 1 --profiles jrc-2021 = 0
+        + preventable under jrc-2021:
+        - 5.2.5.2
+        - lane intrusion
+        # Each input of the case varies by its own error.
+        lvd --ego-speed 60km/h --gap 10 --acceleration=-5 = 8
+        + UN R157, 5.2.5.1 still holds, whatever the drivers of Annex 3 do
+        + deceleration + 0.05 m/s²
+        cut-in 60 40 15 0.38 = 8
+        + undecided under un-r157:
+        + the answer changes with lateral speed - 0.01 m/s
+        ",
+    );
 }
 
 /// "Robust" is said of every driver that the sentence names, and of no answer at its boundary.

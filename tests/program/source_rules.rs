@@ -1,5 +1,5 @@
-//! Rules for the repository's own sources: every combination of features is checked by CI. Licences, origins and duplicates of
-//! other crates are `cargo deny`'s (`deny.toml`); unsafe code and what changes the process are clippy's.
+//! Rules for the repository's own sources. Licences, origins and duplicates of other crates are `cargo deny`'s (`deny.toml`);
+//! unsafe code and what changes the process are clippy's.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -7,25 +7,6 @@ use std::process::Command;
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-}
-
-fn toml_file(name: &str) -> toml::Table {
-    let text = std::fs::read_to_string(root().join(name)).expect(name);
-    text.parse().expect(name)
-}
-
-/// Everything is what all else in CI builds.
-#[test]
-fn every_combination_of_features_is_built() {
-    let manifest = toml_file("Cargo.toml");
-    let features: Vec<&str> = manifest["features"].as_table().expect("features").keys().map(String::as_str).collect();
-    assert_eq!(
-        features,
-        ["arrow", "cli", "default", "gpu", "parquet"],
-        "lint the combinations with each new feature in .ci/run"
-    );
-    let run = std::fs::read_to_string(root().join(".ci/run")).expect(".ci/run");
-    assert!(run.contains("for features in gpu,parquet cli,arrow; do"), "a combination is not built");
 }
 
 /// A release is named alike wherever it is cited, packaged or archived (RELEASING.md).

@@ -59,6 +59,7 @@ fn good_geometry_says_nothing() {
 #[test]
 fn a_mirrored_axis_and_a_wrong_reference_point_are_named_with_vehicle_and_frame() {
     let texts = Texts::of(&traffic());
+    let y_with = |part: f64| changed(&texts, "y", |y, height| y + part * height);
     let cases: [(&str, Texts, &[&str]); 7] = [
         ("upside down", changed(&texts, "y", |y, _| -y), &["column y", "10 of 10", "vehicle 1 at frame 25", "with -y"]),
         ("upside down, corner", changed(&texts, "y", |y, height| -y - height), &["10 of 10", "with -y"]),
@@ -67,16 +68,8 @@ fn a_mirrored_axis_and_a_wrong_reference_point_are_named_with_vehicle_and_frame(
             changed(&texts, "y", |y, height| 8.0 + 31.25 - y - height),
             &["10 of 10", "vehicle 1 at frame 25", "from the other side of the road"],
         ),
-        (
-            "centre",
-            changed(&texts, "y", |y, height| y + height / 2.0),
-            &["cross lane lines", "the centre of the box", "frame 1"],
-        ),
-        (
-            "lower edge",
-            changed(&texts, "y", |y, height| y + height),
-            &["cross lane lines", "the lower edge of the box"],
-        ),
+        ("centre", y_with(0.5), &["cross lane lines", "the centre of the box", "frame 1"]),
+        ("lower edge", y_with(1.0), &["cross lane lines", "the lower edge of the box"]),
         ("lateral speed", changed(&texts, "yVelocity", |v, _| -v), &["yVelocity", "mirrored", "at frame"]),
         ("a lane beside", changed(&texts, "y", |y, _| y + 3.6), &["10 of 10", "outside the lane that `laneId`"]),
     ];
@@ -88,12 +81,8 @@ fn a_mirrored_axis_and_a_wrong_reference_point_are_named_with_vehicle_and_frame(
         }
         assert!(text.contains("01_tracks.csv"), "{what}: {text}");
         let help = error.help().unwrap();
-        assert!(
-            help.contains("it points down")
-                && help.contains("lane markings")
-                && help.contains("option `accept_implausible`"),
-            "{what}: {help}"
-        );
+        let advice = ["it points down", "lane markings", "option `accept_implausible`"];
+        assert!(advice.iter().all(|words| help.contains(words)), "{what}: {help}");
         let notes = read(&texts, Implausible::Accepted).unwrap().notes;
         assert!(!notes.is_empty(), "{what}: accepted without a word");
     }

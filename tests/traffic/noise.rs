@@ -6,7 +6,6 @@ use lanesweep::scenario::Category;
 use lanesweep::support::plausibility::Implausible;
 use lanesweep::traffic::mining::{MiningOptions, count, mine, mine_inputs, noise_notes};
 use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
-use lanesweep::traffic::trajectory::tracks::{self, Preset, TrackFile};
 use lanesweep::traffic::trajectory::{Inputs, Recording};
 
 use crate::common::exid::Plain;
@@ -35,11 +34,7 @@ fn rounded(mut table: Plain, columns: &[&str], step: f64) -> Plain {
 
 /// Kept leader decelerations of a table, and the notes on noise.
 fn mined(table: &Plain, smoothing_s: Option<f64>) -> (u64, Vec<String>) {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("own.csv");
-    fs::write(&path, table.text()).unwrap();
-    let preset = Preset { smoothing_s, ..Preset::load("generic").unwrap() };
-    let read = tracks::read_tracks(&TrackFile { path, id: "own".to_owned() }, &preset).unwrap().remove(0);
+    let read = crate::tracks::read(table, &|preset| preset.smoothing_s = smoothing_s).unwrap();
     let graves: Vec<_> = read.understanding.findings.iter().filter(|finding| finding.is_grave).collect();
     assert!(graves.is_empty(), "{graves:?}");
     let options = MiningOptions::default();
@@ -97,14 +92,9 @@ fn runs_carry_the_note_of_noise() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("own.csv");
     fs::write(&path, rounded(without_speeds(f64::INFINITY), &["x", "y"], 0.01).text()).unwrap();
-    let collection =
-        mine_inputs(Inputs::of(&path, None).unwrap(), &MiningOptions::default(), Implausible::Refused, || Ok(()))
-            .unwrap();
-    assert!(
-        collection.notes.iter().any(|note| note.starts_with("recording own: noise can decide")),
-        "{:?}",
-        collection.notes
-    );
+    let inputs = Inputs::of(&path, None).unwrap();
+    let notes = mine_inputs(inputs, &MiningOptions::default(), Implausible::Refused, || Ok(())).unwrap().notes;
+    assert!(notes.iter().any(|note| note.starts_with("recording own: noise can decide")), "{notes:?}");
 }
 
 #[test]
@@ -115,17 +105,7 @@ fn one_speed_per_vehicle_is_refused() {
         track.v_s_mps.fill(mean);
         track.v_d_mps.fill(0.0);
     }
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("own.csv");
-    fs::write(&path, Plain::of(&recording, 5).without(&["heading", "vx", "vy"]).text()).unwrap();
-    let preset = Preset::load("generic").unwrap();
-    let read = tracks::read_tracks(&TrackFile { path, id: "own".to_owned() }, &preset).unwrap().remove(0);
-    assert!(
-        read.understanding
-            .findings
-            .iter()
-            .any(|finding| finding.is_grave && finding.text.contains("one speed per vehicle")),
-        "{:?}",
-        read.understanding.findings
-    );
+    let table = Plain::of(&recording, 5).without(&["heading", "vx", "vy"]);
+    let found = crate::tracks::understood(&table, &|_| ()).unwrap().findings;
+    assert!(found.iter().any(|of| of.is_grave && of.text.contains("one speed per vehicle")), "{found:?}");
 }
