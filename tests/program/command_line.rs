@@ -384,9 +384,6 @@ fn a_study_of_some_headways_and_models_computes_no_claim_that_needs_all() {
     let verdicts: Vec<String> = claims.records().map(|row| row.unwrap()[verdict].to_owned()).collect();
     assert!(verdicts.len() > 3 && verdicts.iter().all(|v| v == "not computed"), "{verdicts:?}");
     let headways = read(dir.path(), "out/headways.csv");
-    let page = read(dir.path(), "out/report.html");
-    assert!(page.contains("LVD failures") && !page.contains("cut-in 2") && !page.contains("not computed"), "{page}");
-    assert!(!page.contains("claims on this data"), "{page}");
     assert!(headways.contains(",1.2s,RSS,") && !headways.contains(",2s,") && !headways.contains("CCHDM"), "{headways}");
 }
 
