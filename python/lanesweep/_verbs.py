@@ -35,14 +35,12 @@ if TYPE_CHECKING:
 
 __all__ = [
     "check",
-    "export_xosc",
     "fit",
     "map",
     "merge",
     "mine",
     "sample",
     "study",
-    "synth",
     "trace",
     "tracks",
 ]
@@ -120,10 +118,11 @@ def study(
 
 
 def tracks(
-    paths: Paths,
+    paths: Paths | None = None,
     *,
     preset: Path | None = None,
     convert: Path | None = None,
+    synth_recordings: Int | None = None,
     out: Path | None = None,
     **options: Unpack[Run],
 ) -> Result:
@@ -135,11 +134,13 @@ def tracks(
     Parameters
     ----------
     paths : list of paths
-        Track files, or folders of them.
+        Track files, or folders of them. Without any, `convert` is a folder for the generated recordings that `study` uses without data.
     preset : str or path
         Format: ``"exid"``, ``"sumo-fcd"``, … or a TOML file that says what the columns mean; by default it is detected.
     convert : path
         Write the tracks in highD's format into this folder, or as one table: .csv, .parquet, .jsonl.
+    synth_recordings : int
+        Number of generated recordings, by default 84.
     out : path, optional
         Folder for tracks.json and a figure of each recording. Without it those of a single path go with the result.
     **options
@@ -149,6 +150,8 @@ def tracks(
     -------
     Result
     """
+    if paths is None:
+        return run("tracks", locals(), path=convert)
     return run("tracks", locals(), default_out=None if _are_several(paths) else "tracks")
 
 
@@ -401,7 +404,7 @@ def check(
 def trace(
     *,
     from_: Path | None = None,
-    lane: str | None = None,
+    lane: str | Collection[str] | None = None,
     scenarios: Path | None = None,
     compare: Keys | bool = False,
     case_file: Path | None = None,
@@ -412,18 +415,22 @@ def trace(
     dt: Float | None = None,
     plot: Path | None = None,
     plot_end: Number | None = None,
+    xosc: Path | None = None,
+    ego: Literal["model", "external"] | None = None,
+    duration: Number | None = None,
+    side: Literal["left", "right"] | None = None,
     **case: Unpack[Case],
 ) -> Result:
-    """Run one case, or one lane of a finished run, step by step. For many cases there is `simulate`.
+    """Run one case, or lanes of a finished run, step by step. For many cases there is `simulate`.
 
     Parameters
     ----------
     from_ : path
         Folder of a study or sample: repeats `lane` with the run's profile and options, bit for bit.
-    lane : str
-        Key of a lane: scenario/variant/headway/model.
+    lane : list of str
+        Keys of lanes: scenario/variant/headway/model.
     scenarios : path
-        Scenario file, for `lane`.
+        Scenario file, for `lane`; with a study and `xosc`: its scenarios, for sizes, side and lane width.
     compare : bool or list of str
         Also simulate other variants of the lane's scenario: True for S, keys of parameterizations, or ``"all"``.
     case_file : path
@@ -442,6 +449,15 @@ def trace(
         Also draw the series, as SVG.
     plot_end : float
         End of the figure's time axis, s.
+    xosc : path
+        Also write every lane as ASAM OpenSCENARIO XML 1.2 with an OpenDRIVE road into this folder; index.csv lists them with their
+        outcomes. The other vehicles follow their own motion, step by step.
+    ego : {"model", "external"}
+        In `xosc` the ego follows the path that the driver model drove; or only its start is written, for a controller of your own.
+    duration : float
+        End of the scenario with ``ego="external"``, s; by default 10 s after the lane's last event and end.
+    side : {"left", "right"}
+        Side in `xosc` that the other vehicle comes from or leaves to; by default the scenario's, else left.
     **case
         `Case` of `lanesweep.options`; it overrides values of a file.
 
@@ -453,79 +469,6 @@ def trace(
     if isinstance(compare, (bool, np.bool_)):
         return run("trace", {**locals(), "compare": "S" if compare else None})
     return run("trace", locals())
-
-
-def export_xosc(
-    *,
-    from_: Path | None = None,
-    lane: str | Collection[str] | None = None,
-    scenarios: Path | None = None,
-    case_file: Path | None = None,
-    models: Models | None = None,
-    ego: Literal["model", "external"] | None = None,
-    duration: Number | None = None,
-    side: Literal["left", "right"] | None = None,
-    profile: Path | None = None,
-    dt: Float | None = None,
-    out: Path | None = None,
-    **case: Unpack[Case],
-) -> Result:
-    """Write lanes as ASAM OpenSCENARIO XML 1.2 with an OpenDRIVE road.
-
-    Every lane becomes an .xosc and an .xodr file; index.csv lists them with their outcomes. The other vehicles follow their own motion,
-    step by step.
-
-    Parameters
-    ----------
-    from_ : path
-        Folder of a study or sample, for `lane`.
-    lane : list of str
-        Keys of lanes: scenario/variant/headway/model.
-    scenarios : path
-        Scenario file, for `lane`; with a study: its scenarios, for sizes, side and lane width.
-    case_file : path
-        TOML file with the case.
-    models : list of str or Driver
-        Driver models, by default Reg157, CCHDM, RSS and FSM.
-    ego : {"model", "external"}
-        The ego follows the path that the driver model drove; or only its start is written, for a controller of your own.
-    duration : float
-        End of the scenario with ``ego="external"``, s; by default 10 s after the lane's last event and end.
-    side : {"left", "right"}
-        Side that the other vehicle comes from or leaves to; by default the scenario's, else left.
-    profile : str or path
-        Constants of drivers and criteria, by default ``"paper"``.
-    dt : float
-        Time step, s; by default that of the profile.
-    out : path, optional
-        Folder of the files; without it they go with the result.
-    **case
-        `Case` of `lanesweep.options`; it overrides values of a file.
-
-    Returns
-    -------
-    Result
-    """
-    return run("export_xosc", locals(), default_out="xosc")
-
-
-def synth(folder: Path, *, synth_recordings: Int | None = None, **options: Unpack[Run]) -> Result:
-    """Write the generated recordings that `study` uses without data, in highD's format.
-
-    Parameters
-    ----------
-    folder : path
-        Folder of the recordings.
-    synth_recordings : int
-        Their number, by default 84.
-    **options
-        `Run` of `lanesweep.options`.
-
-    Returns
-    -------
-    Result
-    """
-    return run("synth", locals(), path=folder)
 
 
 def merge(folder: Path, *, failures: Path | None = None, **options: Unpack[Run]) -> Result:

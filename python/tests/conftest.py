@@ -28,7 +28,7 @@ def program() -> Callable[..., subprocess.CompletedProcess[str]]:
 def scenarios(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Mined scenarios of two generated recordings."""
     folder = tmp_path_factory.mktemp("data")
-    lanesweep.synth(folder / "recordings", synth_recordings=2)
+    lanesweep.tracks(convert=folder / "recordings", synth_recordings=2)
     return Path(lanesweep.mine(folder / "recordings", out=folder / "scenarios.jsonl"))
 
 

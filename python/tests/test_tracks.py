@@ -31,7 +31,7 @@ FOOT_M = 0.3048
 def traffic(tmp_path_factory: pytest.TempPathFactory) -> pl.DataFrame:
     """A generated recording: forty vehicles of each direction, in our columns, sorted by vehicle and time."""
     folder = tmp_path_factory.mktemp("traffic")
-    lanesweep.synth(folder / "recordings", synth_recordings=1)
+    lanesweep.tracks(convert=folder / "recordings", synth_recordings=1)
     lanesweep.tracks(folder / "recordings", convert=folder / "own.parquet")
     own = pl.read_parquet(folder / "own.parquet")
     forward = pl.col("vx") > 0

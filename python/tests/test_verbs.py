@@ -47,7 +47,7 @@ def test_a_study_has_the_bytes_of_the_command_line(program, scenarios, tmp_path)
 
 
 def test_tracks_say_what_a_table_holds_and_other_verbs_read_it(tmp_path) -> None:
-    recordings = lanesweep.synth(tmp_path / "recordings", synth_recordings=1).folder
+    recordings = lanesweep.tracks(convert=tmp_path / "recordings", synth_recordings=1).folder
     table = tmp_path / "own.csv"
     lanesweep.tracks(recordings, convert=table)
     about = lanesweep.tracks(table, out=tmp_path / "figures")
@@ -157,7 +157,7 @@ def test_an_interrupt_ends_a_run_and_a_next_one_works(density) -> None:
 @pytest.mark.skipif(os.name == "nt", reason="signals")
 def test_an_interrupt_ends_reading_and_generating_recordings(tmp_path) -> None:
     long = {"synth_recordings": 99, "config": "generator.duration_s=1000"}
-    for call in (lambda: lanesweep.synth(tmp_path / "recordings", **long), lambda: lanesweep.study(**long)):
+    for call in (lambda: lanesweep.tracks(convert=tmp_path / "recordings", **long), lambda: lanesweep.study(**long)):
         threading.Timer(0.5, lambda: signal.raise_signal(signal.SIGINT)).start()
         start = time.monotonic()
         with pytest.raises(KeyboardInterrupt):
@@ -167,7 +167,7 @@ def test_an_interrupt_ends_reading_and_generating_recordings(tmp_path) -> None:
 
 
 def test_input_that_is_left_out_is_named_in_the_messages(tmp_path) -> None:
-    recordings = lanesweep.synth(tmp_path / "recordings", synth_recordings=2)
+    recordings = lanesweep.tracks(convert=tmp_path / "recordings", synth_recordings=2)
     (tmp_path / "recordings" / "02_tracks.csv").write_text("frame,id\n")
     mined = lanesweep.mine(recordings)
     assert mined.status == "incomplete" and any("02_tracks.csv" in line for line in mined.messages)
@@ -289,7 +289,7 @@ def test_values_keep_their_meaning_and_names_their_letters(density, scenarios, t
         (lambda: lanesweep.study(scenarios), lanesweep.UsageError, "give it as `scenarios`"),
         (lambda: lanesweep.study(scenarios=scenarios, out=""), lanesweep.UsageError, "`out`: a path is needed"),
         (lambda: lanesweep.study(scenarios=tmp_path / "my --models.jsonl"), lanesweep.LanesweepError, "my --models.jsonl"),
-        (lambda: lanesweep.tracks(None), lanesweep.UsageError, "`paths`: it is needed"),
+        (lambda: lanesweep.tracks(), lanesweep.UsageError, "there is nothing to read"),
         (lambda: lanesweep.tracks(scenarios), lanesweep.InputError, "scenarios.jsonl"),
         (lambda: lanesweep.study(thw=[[1.0]]), TypeError, "`thw` has the value"),
     ]:

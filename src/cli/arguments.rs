@@ -203,7 +203,7 @@ pub(super) fn choice<T: ValueEnum>(value: &Value) -> std::result::Result<T, Stri
 }
 
 /// An argument that means nothing without another one, by verb.
-pub(super) const NEEDS: [(&[&str], &str, &str); 8] = [
+pub(super) const NEEDS: [(&[&str], &str, &str); 13] = [
     (&["study", "fit", "verify", "mine"], "preset", "recordings"),
     (&["check"], "scenario", "file"),
     (&["check"], "row", "file"),
@@ -212,6 +212,11 @@ pub(super) const NEEDS: [(&[&str], &str, &str); 8] = [
     (&["simulate"], "from", "lane"),
     (&["simulate"], "compare", "lane"),
     (&["simulate"], "plot_end", "plot"),
+    (&["simulate"], "ego", "xosc"),
+    (&["simulate"], "duration", "xosc"),
+    (&["simulate"], "side", "xosc"),
+    (&["tracks"], "preset", "paths"),
+    (&["tracks"], "out", "paths"),
 ];
 
 /// The arguments of one call.

@@ -231,7 +231,7 @@ impl Check {
                 Err(Error::usage(Place::file(path), "a scenario file has many scenarios", help))
             }
             ("xosc", _) => {
-                let help = "give a .jsonl scenario file; `export` writes OpenSCENARIO only";
+                let help = "give a .jsonl scenario file; OpenSCENARIO is written by `simulate`, not read";
                 Err(Error::usage(Place::file(path), "OpenSCENARIO files are not read as cases", help))
             }
             (_, Some(_)) => {

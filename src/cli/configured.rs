@@ -42,7 +42,7 @@ pub(super) struct Configured {
 type KeyFlag = (&'static str, &'static str, &'static str, &'static str, bool, &'static [&'static str]);
 
 const SWEEPING: &[&str] = &["study", "sample", "map", "verify", "show"];
-const SIMULATING: &[&str] = &["study", "sample", "map", "verify", "show", "simulate", "xosc"];
+const SIMULATING: &[&str] = &["study", "sample", "map", "verify", "show", "simulate"];
 const GENERATING: &[&str] = &["study", "fit", "verify", "show"];
 
 #[rustfmt::skip] // a table: one line per flag
@@ -55,7 +55,7 @@ pub(super) const FLAGS: [KeyFlag; 18] = [
     ("run.profile", "profile", "NAME|FILE", MODELS, false, SIMULATING),
     ("run.dt_s", "dt", "", MODELS, true, SIMULATING),
     ("generator.recordings", "synth_recordings", "", DATA, true, GENERATING),
-    ("generator.recordings", "synth_recordings", "", DATA, false, &["synth"]),
+    ("generator.recordings", "synth_recordings", "", DATA, false, &["tracks"]),
     ("score.seed", "seed", "", RUN, false, &["study"]),
     ("fit.seed", "seed", "", RUN, false, &["fit"]),
     ("sample.estimator", "estimator", "", MODELS, false, &["sample"]),
@@ -96,14 +96,25 @@ const REMOVED: [(&str, &str); 12] = [
     ("--threshold-units", "verify.threshold_units=N"),
 ];
 
-/// Adds what replaced a removed flag to the error about it.
+/// Verbs of earlier versions, with what replaced them.
+const REMOVED_VERBS: [(&str, &str); 2] =
+    [("export", "lanesweep simulate … --xosc DIR"), ("synth", "lanesweep tracks --convert DIR")];
+
+/// Adds what replaced a removed flag or verb to the error about it.
 pub(super) fn name_replacement(error: &mut clap::Error) {
-    let Some(ContextValue::String(flag)) = error.get(ContextKind::InvalidArg) else { return };
-    if let Some((_, key)) = REMOVED.iter().find(|(removed, _)| flag == removed) {
-        // Similar flags, and their use, are not meant.
-        error.remove(ContextKind::SuggestedArg);
-        error.remove(ContextKind::Usage);
-        let tip = format!("write '--config {key}' instead").into();
+    let of = |kind| match error.get(kind) {
+        Some(ContextValue::String(word)) => word.as_str(),
+        _ => "",
+    };
+    let (flag, verb) = (of(ContextKind::InvalidArg), of(ContextKind::InvalidSubcommand));
+    let key = REMOVED.iter().find(|(removed, _)| flag == *removed).map(|(_, key)| format!("--config {key}"));
+    let verb = || REMOVED_VERBS.iter().find(|(removed, _)| verb == *removed).map(|(_, now)| (*now).to_owned());
+    if let Some(now) = key.or_else(verb) {
+        // Similar words, and their use, are not meant.
+        for kind in [ContextKind::SuggestedArg, ContextKind::SuggestedSubcommand, ContextKind::Usage] {
+            error.remove(kind);
+        }
+        let tip = format!("write '{now}' instead").into();
         error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip]));
     }
 }
@@ -122,7 +133,8 @@ fn flags_of(verb: &str) -> impl Iterator<Item = KeyFlag> {
 fn with_flags(mut command: Command, keys: &[Key]) -> Command {
     command = command.mut_subcommands(|verb| with_flags(verb, keys));
     let has = |id: &str| command.get_arguments().any(|arg| arg.get_id() == id);
-    let (has_plan, has_data) = (has("plan"), has("scenarios"));
+    let has_plan = has("plan");
+    let data: Vec<&str> = ["recordings", "scenarios", "paths"].into_iter().filter(|id| has(id)).collect();
     let verb = command.get_name().to_owned();
     for (name, id, value_name, heading, is_seldom, _) in flags_of(&verb) {
         let Some(key) = Key::find(keys, name) else { continue };
@@ -131,8 +143,8 @@ fn with_flags(mut command: Command, keys: &[Key]) -> Command {
         if has_plan && is_of_plan(name) {
             arg = arg.conflicts_with("plan");
         }
-        if has_data && name == "generator.recordings" {
-            arg = arg.conflicts_with_all(["recordings", "scenarios"]);
+        if name == "generator.recordings" {
+            arg = arg.conflicts_with_all(&data);
         }
         command = command.arg(arg);
     }

@@ -19,7 +19,7 @@ pub const STACK_BYTES: usize = 8 << 20;
 type Function = (&'static str, &'static [&'static str], fn(&mut Arguments) -> Result<Verb>);
 
 #[rustfmt::skip] // a table
-const FUNCTIONS: [Function; 11] = [
+const FUNCTIONS: [Function; 9] = [
     ("study", &["study"], |given| Ok(Verb::Study(of(given)?))),
     ("tracks", &["tracks"], |given| Ok(Verb::Tracks(of(given)?))),
     ("mine", &["mine"], |given| Ok(Verb::Mine(of(given)?))),
@@ -28,8 +28,6 @@ const FUNCTIONS: [Function; 11] = [
     ("map", &["map"], |given| Ok(Verb::Map(of(given)?))),
     ("check", &["check"], |given| Ok(Verb::Check(of(given)?))),
     ("trace", &["simulate"], |given| Ok(Verb::Simulate(of(given)?))),
-    ("export_xosc", &["export", "xosc"], |given| Ok(Verb::Export(of(given)?))),
-    ("synth", &["synth"], |given| Ok(Verb::Synth(of(given)?))),
     ("merge", &["merge"], |given| Ok(Verb::Merge(of(given)?))),
 ];
 

@@ -7,9 +7,9 @@ use clap::{Arg, ArgAction, Command};
 const VERBS: [(&str, &[&str]); 5] = [
     ("Study a data set", &["tracks", "study", "mine"]),
     ("Probabilities", &["fit", "sample"]),
-    ("Single cases and grids", &["check", "simulate", "map", "export"]),
+    ("Single cases and grids", &["check", "simulate", "map"]),
     ("More machines", &["merge"]),
-    ("Tools", &["verify", "devices", "config", "synth"]),
+    ("Tools", &["verify", "devices", "config"]),
 ];
 
 pub(super) const DATA: &str = "Data";

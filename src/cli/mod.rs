@@ -11,7 +11,6 @@ mod console;
 mod devices;
 pub mod embedded;
 mod exit;
-mod export;
 mod fit;
 mod format;
 mod help;
@@ -29,9 +28,9 @@ pub mod signals;
 mod simulate;
 mod source;
 mod study;
-mod synth;
 mod tracks;
 mod verify;
+mod xosc;
 
 pub use exit::Exit;
 
@@ -94,11 +93,9 @@ enum Verb {
     Mine(mine::Mine),
     Fit(fit::Fit),
     Sample(Box<sample::Sample>),
-    Synth(synth::Synth),
     Map(Box<map::Map>),
     Simulate(simulate::Simulate),
     Check(check::Check),
-    Export(export::Export),
     Merge(merge::Merge),
     Verify(Box<verify::Verify>),
     Devices(devices::Devices),
@@ -183,11 +180,9 @@ impl Verb {
             Verb::Mine(verb) => verb.run(configured),
             Verb::Fit(verb) => verb.run(configured),
             Verb::Sample(verb) => verb.run(configured),
-            Verb::Synth(verb) => verb.run(configured),
             Verb::Map(verb) => verb.run(configured),
             Verb::Simulate(verb) => verb.run(configured),
             Verb::Check(verb) => verb.run(configured),
-            Verb::Export(verb) => verb.run(configured),
             Verb::Merge(verb) => verb.run(configured),
             Verb::Verify(verb) => verb.run(configured),
             Verb::Devices(verb) => verb.run(),

@@ -10,10 +10,12 @@ use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::source::{PlausibilityFlag, refuse_overwriting, scenarios_of};
+use super::xosc::{self, XoscFlags};
 use super::{Exit, Output};
+use crate::report::openscenario::{Concrete, PlayOptions, concrete_case};
 use crate::report::trace::TraceReport;
 use crate::run::reopen::{Reopened, TracedLanes};
-use crate::support::files::write_atomically;
+use crate::support::files::{file_name, write_atomically};
 use crate::support::run_folder::is_listed;
 use crate::{Error, Place, Result};
 
@@ -21,15 +23,14 @@ use crate::{Error, Place, Result};
 ///
 /// The case comes from flags, from a TOML file, from a row of a table (keys and columns are the flags' names with `_`,
 /// speeds with their unit, `ego_speed_kmh`; flags override them), or from a finished run or a scenario file with a lane key. The series goes to stdout as CSV,
-/// the outcome to stderr, the figure to --plot. Several models (--models FSM,RSS) or variants (--compare) follow one
-/// another in the CSV and share one figure.
+/// the outcome to stderr, the figure to --plot, OpenSCENARIO files to --xosc. Several models (--models FSM,RSS), variants
+/// (--compare) or lanes follow one another in the CSV and share one figure.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:\n  \
-                  lanesweep simulate --category cut-in --ego-speed 30m/s --speed 20m/s --thw 1.2 --lateral-speed 1 \\\n      \
-                  --plot case.svg\n  \
+                  lanesweep simulate --category lvd --ego-speed 30m/s --thw 1 --acceleration -6 --plot case.svg\n  \
                   lanesweep simulate --from lanesweep-out --lane 01_cut_in_97_91_957/2/1.2s/RSS --compare S\n  \
-                  lanesweep simulate --scenarios scenarios.jsonl --lane 01_cut_in_97_91_957/S/1.2s/RSS")]
+                  lanesweep simulate --scenarios scenarios.jsonl --lane 01_cut_in_97_91_957/S/1.2s/RSS --xosc played")]
 pub(super) struct Simulate {
     #[command(flatten)]
     case: CaseFlags,
@@ -43,17 +44,19 @@ pub(super) struct Simulate {
     #[arg(long, value_name = "N", help_heading = "Data")]
     row: Option<usize>,
     /// Scenario file (.jsonl, .parquet, .csv) for --lane
-    #[arg(long, value_name = "FILE", help_heading = "Data")]
+    ///
+    /// With --from a study and --xosc: the study's scenarios, for sizes, side and lane width.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["case_file", "table"], help_heading = "Data")]
     scenarios: Option<PathBuf>,
     /// Folder (--out) of a study or sample, for --lane
     ///
     /// Repeats that lane with the run's profile and options, bit for bit, and reports whether f64 gives another
     /// outcome.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["scenarios", "case_file", "table", "profile", "dt"], help_heading = "Data")]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["case_file", "table", "profile", "dt"], help_heading = "Data")]
     from: Option<PathBuf>,
-    /// Lane key: scenario/variant/headway/model
+    /// Lane key: scenario/variant/headway/model; repeatable
     #[arg(long, value_name = "KEY", help_heading = "Data")]
-    lane: Option<String>,
+    lane: Vec<String>,
     /// Also simulate other variants of the lane's scenario
     ///
     /// S (the recorded scenario; the default without a value), keys of parameterizations, or all.
@@ -68,6 +71,8 @@ pub(super) struct Simulate {
     #[arg(long, value_name = "s", value_parser = time_s, help_heading = "Output", hide_short_help = true)]
     plot_end: Option<f64>,
     #[command(flatten)]
+    xosc: XoscFlags,
+    #[command(flatten)]
     plausibility: PlausibilityFlag,
     #[command(flatten)]
     format: FormatFlag,
@@ -76,18 +81,20 @@ pub(super) struct Simulate {
 from_arguments!(
     Simulate { case_file, table, row, scenarios, from, lane, compare, plot }
     parsed { plot_end: time_s }
-    groups { case, plausibility, format }
+    groups { case, xosc, plausibility, format }
 );
 
 impl Simulate {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         self.guard_plot()?;
-        let (lanes, incomplete) = self.lanes(configured)?;
+        let options = self.xosc.options(self.case.lane_width_m())?;
+        let (lanes, played, incomplete) = self.lanes(configured, options.as_ref())?;
         let report = TraceReport(&lanes);
         if let Some(path) = &self.plot {
             // Write the figure before the table: a closed stdout must not prevent it.
             write_atomically(path, report.figure(self.plot_end).svg().as_bytes())?;
         }
+        self.xosc.write(&played)?;
         let exit = if incomplete { Exit::Incomplete } else { Exit::Ok };
         let output = self.format.output(exit, || report.csv(), || report.json())?;
         if configured.verbosity != Verbosity::Quiet {
@@ -96,37 +103,52 @@ impl Simulate {
         Ok(output)
     }
 
-    /// The lanes, and whether others of the file were skipped.
-    fn lanes(&self, configured: &Configured) -> Result<(TracedLanes, bool)> {
-        let Some(key) = &self.lane else {
+    /// The lanes, their OpenSCENARIO scenarios, and whether others of the file were skipped.
+    fn lanes(
+        &self,
+        configured: &Configured,
+        options: Option<&PlayOptions>,
+    ) -> Result<(TracedLanes, Vec<Concrete>, bool)> {
+        let wrong = |flag: &str, problem: &str, help: &str| Err(Error::usage(Place::item(flag), problem, help));
+        let [key, ..] = &self.lane[..] else {
             let profile = configured.profile()?;
             let traced = self.flags()?.traced(&profile, self.plausibility.policy())?;
-            return Ok((traced.into_lanes(&profile), false));
+            let played = options.map(|options| concrete_case(&traced, &profile, options)).transpose()?;
+            return Ok((traced.into_lanes(&profile), played.unwrap_or_default(), false));
         };
-        if self.case.says_a_case() {
-            return Err(Error::usage(
-                Place::item("--lane"),
-                "the lane is a complete case: the other flags would be ignored",
-                "leave out the case's flags, or --lane with its --scenarios or --from",
-            ));
+        // The road of --xosc may have lanes of another width.
+        if self.case.says_more_than_lanes() || options.is_none() && self.case.says_a_case() {
+            let help = "leave out the case's flags, or --lane with its --scenarios or --from";
+            return wrong("--lane", "the lane is a complete case: the other flags would be ignored", help);
         }
-        let (reopened, incomplete) = match (&self.from, &self.scenarios) {
-            (Some(dir), _) => {
+        let (mut mined, incomplete) = match &self.scenarios {
+            Some(_) if self.from.is_some() && options.is_none() => {
+                return wrong("--scenarios", "the run (--from) has the scenario", "leave one out, or add --xosc DIR");
+            }
+            Some(path) => scenarios_of(path, self.plausibility.policy())?,
+            None => Default::default(),
+        };
+        let reopened = match (&self.from, &self.scenarios) {
+            (Some(dir), scenarios) => {
                 configured.refuse_assigned("is decided by the run (--from)", "leave it out")?;
-                (Reopened::run(dir, key)?, false)
+                let reopened = Reopened::run(dir, key)?;
+                if scenarios.is_some() && reopened.as_study().is_none() {
+                    return wrong("--scenarios", "sampled lanes have the mean sizes of their density", "leave it out");
+                }
+                reopened
             }
             (None, Some(path)) => {
-                let profile = configured.profile()?;
-                let (mut scenarios, incomplete) = scenarios_of(path, self.plausibility.policy())?;
-                let data = format!("scenarios of {}", path.display());
-                (Reopened::scenarios(&mut scenarios, std::slice::from_ref(key), &profile, data)?, incomplete)
+                let data = format!("scenarios of {}", file_name(path));
+                Reopened::scenarios(&mut mined, &self.lane, &configured.profile()?, data)?
             }
             (None, None) => {
                 let help = "add --from DIR for a lane of a study or a sampling run, or --scenarios FILE";
-                return Err(Error::usage(Place::item("--lane"), "a key alone does not identify a lane", help));
+                return wrong("--lane", "a key alone does not identify a lane", help);
             }
         };
-        Ok((reopened.traced(key, self.case.named_models()?.as_deref(), &self.compare)?, incomplete))
+        let keys = reopened.named(&self.lane, self.case.named_models()?.as_deref(), &self.compare)?;
+        let played = options.map(|options| xosc::played(&reopened, &keys, &mined, options)).transpose()?;
+        Ok((reopened.traced(&keys)?, played.unwrap_or_default(), incomplete))
     }
 
     fn flags(&self) -> Result<GivenCase> {

@@ -1,4 +1,5 @@
-//! `lanesweep tracks`: what is in a track file? Reads it, checks it against itself, draws and converts it.
+//! `lanesweep tracks`: what is in a track file? Reads it, checks it against itself, draws and converts it. Also writes
+//! the synthetic recordings.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -8,15 +9,18 @@ use serde::Serialize;
 
 use super::arguments::from_arguments;
 use super::configured::Configured;
+use super::console::Total;
 use super::format::FormatFlag;
-use super::{Exit, Output};
+use super::{Exit, Output, source};
 use crate::report::tracks::{TrackReport, across};
 use crate::scenario::usable;
 use crate::support::files::check_folder;
 use crate::support::plausibility::Implausible;
-use crate::support::run_folder::{RunFolder, unfinished};
+use crate::support::run_folder::{Results, RunFolder, unfinished};
 use crate::support::table::{Table, TableMetadata};
+use crate::traffic::Source;
 use crate::traffic::mining::{counts, mine, noise_notes};
+use crate::traffic::trajectory::generator::generate_one;
 use crate::traffic::trajectory::highd::{self, HighdFiles, SYNTHETIC_MARKER};
 use crate::traffic::trajectory::tracks::{LoadedTracks, SYNTHETIC, Understanding, read_tracks};
 use crate::traffic::trajectory::{InputFile, Inputs, Loaded, NO_LANE, Recording, Track, VehicleClass};
@@ -26,14 +30,16 @@ use crate::{Error, Place, Result};
 ///
 /// Finds the format by the names of the columns, reads the tracks and says what was understood: rate, vehicles, road,
 /// lanes, speeds, scenarios. Checks the file against itself: units, axes, reference point, lanes, jumps, overlaps. Verbs
-/// that take recordings read the same files. A preset is a TOML file that says what the columns mean.
+/// that take recordings read the same files. A preset is a TOML file that says what the columns mean. Without a path,
+/// --convert DIR writes the synthetic recordings that `study` uses without data.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     lanesweep tracks own.csv\n  \
-    lanesweep tracks own.csv --preset own.toml --out figures --convert converted")]
+    lanesweep tracks own.csv --preset own.toml --out figures --convert converted\n  \
+    lanesweep tracks --convert recordings")]
 pub(super) struct Tracks {
     /// Track files, or folders of them
-    #[arg(value_name = "PATH", required = true, help_heading = "Data")]
+    #[arg(value_name = "PATH", help_heading = "Data")]
     paths: Vec<PathBuf>,
     /// Format of the files: exid, sumo-fcd, … or a TOML file [default: detected]
     #[arg(long, value_name = "NAME|FILE", help_heading = "Data")]
@@ -52,6 +58,9 @@ from_arguments!(Tracks { paths, preset, out, convert } groups { format });
 
 impl Tracks {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
+        if self.paths.is_empty() {
+            return self.generate(configured);
+        }
         if let Some(out) = &self.out {
             check_folder(out)?;
         }
@@ -84,6 +93,31 @@ impl Tracks {
         let json = || json(&reports);
         let text = || reports.iter().map(TrackReport::text).collect::<Vec<_>>().join("\n");
         self.format.output(if is_complete { Exit::Ok } else { Exit::Incomplete }, text, json)
+    }
+
+    /// Writes the synthetic recordings, which no path names.
+    fn generate(&self, configured: &Configured) -> Result<Output> {
+        let Some(to) = self.convert.as_ref().filter(|to| to.extension().is_none()) else {
+            let help = "give track files, or only --convert DIR (a name without an ending), which writes the synthetic recordings";
+            return Err(Error::usage(Place::item("lanesweep tracks"), "there is nothing to read", help));
+        };
+        let options = &configured.settings.generator;
+        check_folder(to)?;
+        let folder = RunFolder::open(to, SYNTHETIC_MARKER)?;
+        let mut results = results(&folder, &(1..=options.recordings).map(|k| format!("{k:02}")).collect::<Vec<_>>())?;
+        configured.with_bar(Total::Exact(options.recordings as u64), "writing recordings", |bar| {
+            (0..options.recordings).try_for_each(|index| {
+                add(&mut results, &generate_one(options, index)?)?;
+                source::advance(bar)
+            })
+        })?;
+        let sentence = Source::Generated(options.clone()).describe(true);
+        let marker = format!("{sentence}\nNo number on these recordings is a statement about real traffic.\n");
+        // A part of the recordings could be mistaken for all of them, or for real data. All are therefore renamed
+        // together, the marker file last.
+        results.publish(marker.as_bytes())?;
+        tracing::info!("{} synthetic recordings written to {}", options.recordings, to.display());
+        self.format.output(Exit::Ok, String::new, || json(&[(); 0]))
     }
 
     fn of_file(&self, file: &InputFile, configured: &Configured) -> Result<Vec<(TrackReport, Recording)>> {
@@ -173,11 +207,11 @@ fn convert(to: &Path, reports: &[TrackReport], recordings: &[Recording]) -> Resu
 /// Record of a conversion: which recording became which.
 const CONVERTED: &str = "converted.json";
 
-/// Writes recordings in highD's format: all of them, or none.
-fn convert_to_highd(to: &Path, reports: &[TrackReport], recordings: &[Recording]) -> Result<()> {
-    let folder = RunFolder::open(to, CONVERTED)?;
+/// The results of a folder for recordings of these numbers, of which it holds none.
+fn results<'a>(folder: &'a RunFolder, names: &[String]) -> Result<Results<'a>> {
+    let to = folder.dir();
+    // Files that a killed run was renaming are written anew.
     let unfinished = unfinished(to).unwrap_or_default();
-    let names = names(recordings);
     let is_foreign = |file: &PathBuf| file.exists() && !unfinished.iter().any(|name| file.ends_with(name));
     let files = names.iter().flat_map(|id| InputFile::Highd(HighdFiles::named(to, id)).paths());
     if let Some(file) = files.into_iter().find(is_foreign) {
@@ -185,10 +219,22 @@ fn convert_to_highd(to: &Path, reports: &[TrackReport], recordings: &[Recording]
         let problem = format!("it already holds `{name}`, which would be overwritten");
         return Err(Error::usage(Place::file(to), problem, "choose an empty folder"));
     }
-    let mut results = folder.results()?;
+    folder.results()
+}
+
+fn add(results: &mut Results, recording: &Recording) -> Result<()> {
+    let staged = highd::stage(results.dir(), recording)?;
+    staged.into_iter().for_each(|file| results.join(file.closed()));
+    Ok(())
+}
+
+/// Writes recordings in highD's format: all of them, or none.
+fn convert_to_highd(to: &Path, reports: &[TrackReport], recordings: &[Recording]) -> Result<()> {
+    let folder = RunFolder::open(to, CONVERTED)?;
+    let names = names(recordings);
+    let mut results = results(&folder, &names)?;
     for (recording, id) in recordings.iter().zip(&names) {
-        let staged = highd::stage(to, &Recording { id: id.clone(), ..recording.clone() })?;
-        staged.into_iter().for_each(|file| results.join(file.closed()));
+        add(&mut results, &Recording { id: id.clone(), ..recording.clone() })?;
     }
     if recordings.iter().any(|recording| recording.synthetic) {
         results.add(SYNTHETIC_MARKER, b"SYNTHETIC DATA: converted from generated recordings\n")?;

@@ -200,7 +200,7 @@ fn a_contact_has_its_kind_and_the_sign_of_its_closing_speed() {
 fn a_mined_scenario_is_checked_by_its_id() {
     let dir = tempfile::tempdir().unwrap();
     let scenarios = dir.path().join("scenarios.jsonl");
-    ran(dir.path(), "-q synth recordings --synth-recordings 1 --config generator.duration_s=120");
+    ran(dir.path(), "-q tracks --convert recordings --synth-recordings 1 --config generator.duration_s=120");
     ran(dir.path(), "-q mine recordings --out scenarios.jsonl");
     let lines = std::fs::read_to_string(&scenarios).unwrap();
     let found = lines.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
@@ -261,7 +261,7 @@ fn what_holds_no_case_is_refused_with_what_to_give() {
         ("check", 2, "there is nothing to check"),
         ("check a.xosc", 2, "give a .jsonl scenario file"),
         ("check a.xosc --scenario a", 2, "give a .jsonl scenario file"),
-        ("mine a.xosc", 3, "`export` writes OpenSCENARIO only"),
+        ("mine a.xosc", 3, "OpenSCENARIO is written by `simulate`, not read"),
         ("check c.csv", 3, "it has no rows"),
         ("check d.txt", 2, "holds no case"),
         ("check --category cut-in --ego-speed fast", 2, "60km/h"),
@@ -323,10 +323,10 @@ fn a_description_that_contradicts_itself_is_refused_alike_by_every_verb_and_from
             format!("check {flags}"),
             "check case.csv".to_owned(),
             format!("simulate {flags}"),
-            format!("export xosc --out out {flags}"),
+            format!("simulate --xosc out {flags}"),
             "check case.toml".to_owned(),
             "simulate --case-file case.toml".to_owned(),
-            "export xosc --out out --case-file case.toml".to_owned(),
+            "simulate --xosc out --case-file case.toml".to_owned(),
             "simulate --table case.csv".to_owned(),
             "study --scenarios case.csv".to_owned(),
         ];

@@ -40,7 +40,6 @@ fn a_bare_speed_is_refused_in_every_way_to_give_a_case_and_0_is_not() {
         ("check --category cut-in --ego-speed 60", 2, "--ego-speed"),
         ("check bare.toml", 2, "bare.toml, line 2, `ego_speed`"),
         ("simulate --case-file bare.toml", 2, "bare.toml, line 2, `ego_speed`"),
-        ("export xosc --case-file bare.toml", 2, "bare.toml, line 2, `ego_speed`"),
         ("check bare.csv", 3, "bare.csv, line 2, column `ego_speed`"),
         ("check bare.csv --row 1", 3, "bare.csv, line 2, column `ego_speed`"),
         ("simulate --table bare.csv", 3, "bare.csv, line 2, column `ego_speed`"),

@@ -25,7 +25,7 @@ fn scenarios() -> String {
 /// Two synthetic recordings in the folder `data` of a folder.
 fn recordings() -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
-    ran(dir.path(), &format!("-q synth data {SMALL}"));
+    ran(dir.path(), &format!("-q tracks --convert data {SMALL}"));
     dir
 }
 
@@ -153,7 +153,7 @@ fn wrong_words_are_answered_with_what_to_write_instead() {
 fn a_list_with_a_value_twice_is_refused_with_the_value() {
     let dir = tempfile::tempdir().unwrap();
     let lanes = "01_cut_in_81_74_836/S/0.6s/RSS --lane 01_cut_in_81_74_836/S/0.60s/RSS";
-    let lanes = format!("export xosc --scenarios {} --lane {lanes}", scenarios());
+    let lanes = format!("simulate --scenarios {} --lane {lanes}", scenarios());
     let case = "--category lvd --ego-speed 20m/s --gap 20 --acceleration -6";
     for (line, hint) in [
         ("study --thw 0.6,0.6", "--thw: `0.6` is given twice"),
@@ -169,7 +169,6 @@ fn a_list_with_a_value_twice_is_refused_with_the_value() {
         ("map lvd --preset r157 --models RSS,RSS", "--models: `RSS` is given twice"),
         ("sample a.json --estimator is --proposal p.json --proposal p.json", "--proposal: `p.json` is given twice"),
         (&format!("simulate {case} --models FSM,fsm"), "models: `fsm` repeats `FSM`"),
-        (&format!("export xosc {case} --models FSM,fsm"), "models: `fsm` repeats `FSM`"),
         (&format!("check {case} --profiles paper,paper"), "--profiles: `paper` is given twice"),
         (&lanes, "01_cut_in_81_74_836/S/0.6s/RSS"),
     ] {
@@ -184,7 +183,7 @@ fn a_list_with_a_value_twice_is_refused_with_the_value() {
 #[test]
 fn help_names_every_verb_and_every_exit_code() {
     let help = done(Path::new("."), &["--help"]);
-    for word in ["study", "mine", "synth", "simulate", "verify", "merge", "Exit codes"] {
+    for word in ["study", "mine", "tracks", "simulate", "verify", "merge", "Exit codes"] {
         assert!(help.contains(word), "{word}");
     }
     for exit in lanesweep::cli::Exit::ALL {

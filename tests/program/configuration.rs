@@ -153,7 +153,7 @@ fn every_record_names_every_setting_with_its_source() {
         run(line);
         json(&dir.join(record))
     };
-    run("synth data");
+    run("tracks --convert data");
     let fit = run("fit --parameterizations i --out i.json --format json");
     let sample = "sample i.json --models FSM --thw 1";
     // A preset has its own initial distances and panels.
@@ -198,7 +198,7 @@ fn mining_is_configured_alike_for_mine_and_study() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     std::fs::write(dir.join("a.toml"), "[mining.lvd]\nmin_peak_deceleration_mps2 = 1e6\n").unwrap();
-    good(dir, &[], "-q synth data --synth-recordings 2 --config generator.duration_s=120");
+    good(dir, &[], "-q tracks --convert data --synth-recordings 2 --config generator.duration_s=120");
     let kept = |args: &str| {
         let text = good(dir, &[], &format!("-q mine data --kept {args}"));
         text.lines().filter(|line| line.contains("_lvd_")).count()

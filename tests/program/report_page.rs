@@ -47,7 +47,7 @@ fn page(dir: &Path) -> String {
 
 /// Scenarios of the generator, as lines of a scenario file.
 fn scenarios(dir: &Path) -> Vec<String> {
-    quietly(dir, "synth recordings --synth-recordings 2 --config generator.duration_s=240");
+    quietly(dir, "tracks --convert recordings --synth-recordings 2 --config generator.duration_s=240");
     quietly(dir, "mine recordings --out all.jsonl");
     let text = std::fs::read_to_string(dir.join("all.jsonl")).unwrap();
     let kept = text.lines().filter(|line| line.contains("\"kept\":true")).map(str::to_owned).collect::<Vec<_>>();

@@ -9,7 +9,7 @@ use crate::common::program::{done, ran, said, words};
 fn s_prime_of_other_programs_and_of_bases_of_other_folds_are_scored() {
     let dir = tempfile::tempdir().unwrap();
     let of = |name: &str| dir.path().join(name);
-    ran(dir.path(), "-q synth recordings --synth-recordings 6");
+    ran(dir.path(), "-q tracks --convert recordings --synth-recordings 6");
     ran(dir.path(), "-q mine recordings --out scenarios.jsonl");
     // S itself as S' of another program, in a file whose name is no key.
     std::fs::copy(of("scenarios.jsonl"), of("my same.v2.jsonl")).unwrap();

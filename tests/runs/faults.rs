@@ -126,7 +126,7 @@ fn a_folder_that_vanishes_in_mid_run_is_told_or_made_again_and_nothing_is_claime
 fn an_output_that_is_a_file_or_inside_one_is_refused_before_the_work() {
     let bench = Bench::new();
     let dir = bench.path();
-    ran(dir, "-q synth recordings --synth-recordings 1 --config generator.duration_s=60");
+    ran(dir, "-q tracks --convert recordings --synth-recordings 1 --config generator.duration_s=60");
     std::fs::write(dir.join("taken"), "mine").unwrap();
     let study = "study --scenarios scenarios.jsonl --out";
     let is_file = &["a file is where a folder is needed"][..];

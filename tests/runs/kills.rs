@@ -37,8 +37,8 @@ const MAP: &str = "map cut-in --x gap_m=1..20/1 --y lateral_speed_mps=0.5,1 --se
                    --set other_speed_kmh=50 --models FSM,RSS --out out";
 const FIT: &str = "fit --synth-recordings 2 --categories cut-in --parameterizations 2 --config fit.valid_draws=999 \
                    --out out";
-const EXPORT: &str = "export xosc --category cut-in --models FSM --ego-speed 30m/s --speed 20m/s --thw 1.2 \
-                      --lateral-speed 1 --out out";
+const EXPORT: &str = "simulate --category cut-in --models FSM --ego-speed 30m/s --speed 20m/s --thw 1.2 \
+                      --lateral-speed 1 --xosc out";
 
 const VERBS: [Verb; 9] = [
     verb("study", "run.json", STUDY, "study --plan plan/plan.json --threads 1 --out out"),
@@ -63,13 +63,13 @@ const VERBS: [Verb; 9] = [
         "map lvd --x deceleration_mps2=1..9/0.5 --y ego_speed_kmh=30..130/5 --set thw_s=1.2 --out out",
     ),
     verb("fit", "", FIT, "fit --synth-recordings 3 --categories cut-in --config fit.valid_draws=1000 --out out"),
-    verb("synth", "SYNTHETIC.txt", "", "synth out --synth-recordings 3 --config generator.duration_s=30"),
+    verb("tracks", "SYNTHETIC.txt", "", "tracks --convert out --synth-recordings 3 --config generator.duration_s=30"),
     verb(
-        "export",
+        "simulate --xosc",
         "index.csv",
         EXPORT,
-        "export xosc --category cut-in --models FSM,RSS,Reg157 --ego-speed 30m/s --speed 20m/s --thw 0.6 \
-         --lateral-speed 1 --ego external --out out",
+        "simulate --category cut-in --models FSM,RSS,Reg157 --ego-speed 30m/s --speed 20m/s --thw 0.6 \
+         --lateral-speed 1 --ego external --xosc out",
     ),
 ];
 
@@ -209,12 +209,12 @@ fn a_killed_run_of_any_verb_leaves_one_runs_files_and_ends_as_if_undisturbed() {
             }
         }
         // Recordings are read by other verbs: all of them, or none.
-        let is_whole_data = verb.name == "synth" && out.join("SYNTHETIC.txt").exists();
-        if verb.name == "synth" && !is_whole_data {
+        let is_whole_data = verb.name == "tracks" && out.join("SYNTHETIC.txt").exists();
+        if verb.name == "tracks" && !is_whole_data {
             for reader in ["mine out", "study out --out elsewhere"] {
                 let (code, said) = ended(start(dir, reader));
                 let said = unbroken(said.as_bytes());
-                let hints = ["synth", "no recording", "no file here is a recording"];
+                let hints = ["`tracks`", "no recording", "no file here is a recording"];
                 assert!(code == 3 && hints.iter().any(|text| said.contains(text)), "{what}: {reader}: {code} {said}");
             }
         }
@@ -240,7 +240,7 @@ fn scenarios_and_what_was_driven_for_them_are_of_one_run_after_a_kill() {
     let dir = dir.path();
     for (data, seed) in [("a", 1), ("b", 2)] {
         let small = "--synth-recordings 1 --config generator.duration_s=60";
-        done(dir, &format!("synth {data} {small} --config generator.seed={seed}"));
+        done(dir, &format!("tracks --convert {data} {small} --config generator.seed={seed}"));
     }
     put(dir, None);
     let mine = |data: &str| format!("mine {data} --out out/s.jsonl");

@@ -24,11 +24,11 @@ fn read(path: &Path) -> String {
 fn an_output_never_replaces_an_input_or_another_result() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    ran(dir, "-q synth in --synth-recordings 1 --config generator.duration_s=60");
+    ran(dir, "-q tracks --convert in --synth-recordings 1 --config generator.duration_s=60");
     let tracks = read(&dir.join("in/01_tracks.csv"));
     refused(dir, "mine in --out in/01_tracks.csv", 2, "would be overwritten");
     refused(dir, "study in --rows in/01_tracks.csv --out out", 2, "would be overwritten");
-    refused(dir, "synth in --synth-recordings 1", 2, "already holds a recording");
+    refused(dir, "tracks --convert in --synth-recordings 1", 2, "already holds `01_tracks.csv`");
     assert!(read(&dir.join("in/01_tracks.csv")) == tracks);
     scenarios(dir);
     for rows in ["s.jsonl", "out/f1.csv"] {
@@ -56,7 +56,7 @@ fn what_the_run_before_left_goes_and_what_no_record_lists_stays() {
 fn a_foreign_index_of_exported_scenarios_and_a_file_of_their_name_stay() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    let export = "export xosc --category lvd --models FSM --ego-speed 30m/s --thw 1 --acceleration=-5 --out .";
+    let export = "simulate --category lvd --models FSM --ego-speed 30m/s --thw 1 --acceleration=-5 --xosc .";
     std::fs::write(dir.join("a.csv"), "mine").unwrap();
     for (name, content) in [("index.csv", "file,label\na.csv,1\n"), ("001-lvd_1s_FSM.xosc", "mine")] {
         std::fs::write(dir.join(name), content).unwrap();
@@ -119,7 +119,7 @@ fn a_folder_from_somebody_else_makes_no_run_write_elsewhere() {
         (study, "run-plan.json"),
         (&format!("{study} --shard 0/1"), "part-00000-of-00001.lock"),
         (&format!("{study} --shard 0/1"), "part-00000-of-00001.journal"),
-        ("-q synth out --synth-recordings 1 --config generator.duration_s=20", "01_tracksMeta.csv"),
+        ("-q tracks --convert out --synth-recordings 1 --config generator.duration_s=20", "01_tracksMeta.csv"),
     ] {
         std::fs::create_dir(&out).unwrap();
         std::os::unix::fs::symlink(dir.join("precious"), out.join(name)).unwrap();
@@ -172,7 +172,6 @@ fn flags_that_would_not_be_heeded_and_absurd_numbers_of_threads_are_refused() {
         (&*format!("simulate --scenarios s.jsonl {lane} --gap 5"), "would be ignored"),
         ("study --threads 100000000", "expected a whole number from 1 to"),
         (&format!("simulate --from run {lane} {dt}"), "`run.dt_s` is decided by the run"),
-        (&format!("export xosc --from run {lane} {dt}"), "is decided by the run (--from)"),
         (&format!("{check} {dt}"), "`run.dt_s` has no effect on a check"),
         ("study --synth-recordings 2 --scenarios s.jsonl", "cannot be used with"),
         ("study --synth-recordings 2 recordings", "cannot be used with"),
@@ -191,7 +190,7 @@ fn is_synthetic(value: &serde_json::Value) -> bool {
 fn the_label_of_made_up_data_is_in_the_data_and_follows_them_everywhere() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    ran(dir, "-q synth recordings --synth-recordings 2 --config generator.duration_s=150");
+    ran(dir, "-q tracks --convert recordings --synth-recordings 2 --config generator.duration_s=150");
     // Copied without the sentence beside them, as among recordings of other origin.
     std::fs::remove_file(dir.join("recordings/SYNTHETIC.txt")).unwrap();
     ran(dir, "-q mine recordings --out s.jsonl");
@@ -226,7 +225,7 @@ fn the_label_of_made_up_data_is_in_the_data_and_follows_them_everywhere() {
     ] {
         assert!(is_synthetic(&ran(dir, &format!("-q {line} --format json")).parse().unwrap()), "{line}");
     }
-    ran(dir, &format!("-q export xosc --out played {lane}"));
+    ran(dir, &format!("-q simulate --xosc played {lane}"));
     let played = names(&dir.join("played")).into_iter().find(|name| name.ends_with(".xosc")).unwrap();
     assert!(read(&dir.join("played").join(played)).contains("SYNTHETIC DATA"));
 }
@@ -251,7 +250,7 @@ fn converted_recordings_of_one_name_stay_apart_and_made_up_and_replace_no_file()
     let (dir, out) = (dir.path(), dir.path().join("out"));
     for seed in [1, 2] {
         let small = "--synth-recordings 2 --config generator.duration_s=60";
-        ran(dir, &format!("-q synth v{seed} {small} --config generator.seed={seed}"));
+        ran(dir, &format!("-q tracks --convert v{seed} {small} --config generator.seed={seed}"));
     }
     let convert = "-q tracks v1 v2 --convert out";
     // A file of the user's with the name of one of them.

@@ -42,7 +42,7 @@ fn pipe(path: &Path) {
 
 /// A recording in the folder `in`.
 fn recording(dir: &Path) {
-    ran(dir, "-q synth in --synth-recordings 1 --config generator.duration_s=60");
+    ran(dir, "-q tracks --convert in --synth-recordings 1 --config generator.duration_s=60");
 }
 
 /// The ways of reading a file, `@`: whole, line by line, as a table, in pieces.

@@ -184,7 +184,7 @@ fn every_vertex_of_a_case_of_flags_is_that_of_its_series() {
     for flags in [&CUT_IN[..], &CUT_OUT, &LVD] {
         for more in [&[][..], &["--profile", "jrc-2021"], &["--dt", "0.007"], &["--length", "11.3", "--width", "2.3"]] {
             let csv = good(dir.path(), &[&["simulate"], flags, more].concat());
-            good(dir.path(), &[&["export", "xosc", "--out", "x"], flags, more].concat());
+            good(dir.path(), &[&["simulate", "--xosc", "x"], flags, more].concat());
             assert!(compare(&only_scenario(&dir.path().join("x")), &csv) > 20, "{flags:?} {more:?}");
         }
     }
@@ -202,7 +202,7 @@ fn a_cut_out_whose_other_vehicles_overlap_says_so_in_its_file() {
     // By hand: 1.9 m across at 0.8 m/s take 2.375 s; at 20 m/s the bumpers meet after 30 m in 1.5 s. After 100 m in 5 s
     // the vehicles are apart.
     for (flags, first_s) in [(case("0.8", "30"), Some(1.5)), (case("0.8", "100"), None)] {
-        good(dir.path(), &[&["export", "xosc", "--out", "x"], &flags[..]].concat());
+        good(dir.path(), &[&["simulate", "--xosc", "x"], &flags[..]].concat());
         let text = only_scenario(&dir.path().join("x"));
         let (vehicles, all) = played(&text);
         let (other, ahead) = (&vehicles["Other"], &vehicles["Ahead"]);
@@ -232,7 +232,7 @@ fn a_cut_out_whose_other_vehicles_overlap_says_so_in_its_file() {
 fn lanes_of_a_study_and_of_a_sampling_run_are_those_of_simulate_in_binary32() {
     let dir = tempfile::tempdir().unwrap();
     let root = dir.path();
-    good(root, &["synth", "data", "--synth-recordings", "1"]);
+    good(root, &["tracks", "--convert", "data", "--synth-recordings", "1"]);
     good(root, &["mine", "data", "--out", "s.jsonl"]);
     let rows = ["--rows", "lanes.csv"];
     good(root, &[&["study", "--scenarios", "s.jsonl", "--backend", "cpu", "--out", "study"][..], &rows].concat());
@@ -244,9 +244,13 @@ fn lanes_of_a_study_and_of_a_sampling_run_are_those_of_simulate_in_binary32() {
     let keys: Vec<String> = colliding.map(key).take(6).collect();
     let lanes: Vec<&str> = keys.iter().flat_map(|key| ["--lane", key]).collect();
     let check = |args: &[&str], from: &str| {
-        let listed = good(root, &[&["export", "xosc", "--out", "x"], args].concat());
-        for line in listed.lines() {
-            let (file, lane) = line.split_once("  ").unwrap();
+        let printed = series(&good(root, &[&["simulate", "--xosc", "x"], args].concat()));
+        let index = series(&std::fs::read_to_string(root.join("x/index.csv")).unwrap());
+        let mut lanes: Vec<_> = printed.iter().filter_map(|row| row.get("lane")).collect();
+        lanes.dedup();
+        assert!(index.len() == 1 || lanes == index.iter().map(|row| &row["lane"]).collect::<Vec<_>>(), "{lanes:?}");
+        for row in &index {
+            let (file, lane) = (&row["file"], row["lane"].as_str());
             let csv = good(root, &["simulate", "--from", from, "--lane", lane]);
             let text = std::fs::read_to_string(root.join("x").join(file)).unwrap();
             compare(&text, &csv);
@@ -256,7 +260,7 @@ fn lanes_of_a_study_and_of_a_sampling_run_are_those_of_simulate_in_binary32() {
             let road = std::fs::read_to_string(root.join("x").join(file.replace(".xosc", ".xodr"))).unwrap();
             assert!(elements(&road).iter().any(|e| e.path.ends_with("/line")));
         }
-        listed.lines().count()
+        index.len()
     };
     // Lengths by their sums, then by the scenarios; both keep every gap.
     assert_eq!(check(&[&["--from", "study", "--side", "left"], &lanes[..]].concat(), "study"), 6);
@@ -268,10 +272,9 @@ fn lanes_of_a_study_and_of_a_sampling_run_are_those_of_simulate_in_binary32() {
     good(root, &["fit", "--scenarios", "s.jsonl", "--categories", "cut-in", "--parameterizations", "2", "--out", "d"]);
     good(root, &["sample", "d/cut-in-2.json", "--samples", "500", "--backend", "cpu", "--thw", "0.6", "--out", "run"]);
     assert_eq!(check(&["--from", "run", "--lane", "#0/2/0.6s/FSM", "--lane", "#7/2/0.6s/RSS"], "run"), 2);
-    refused(root, &["export", "xosc", "--from", "run"], 2, "a run has many lanes");
     refused(
         root,
-        &["export", "xosc", "--from", "study", "--lane", "no/S/1.2s/RSS"],
+        &["simulate", "--xosc", "x", "--from", "study", "--lane", "no/S/1.2s/RSS"],
         2,
         "there is no lane `no/S/1.2s/RSS`: no scenario `no` in this run",
     );
@@ -281,7 +284,7 @@ fn lanes_of_a_study_and_of_a_sampling_run_are_those_of_simulate_in_binary32() {
 fn the_same_input_gives_the_same_bytes() {
     let dir = tempfile::tempdir().unwrap();
     let bytes = |out: &str, threads: &str| {
-        good(dir.path(), &[&["--threads", threads, "export", "xosc", "--out", out], &CUT_OUT[..]].concat());
+        good(dir.path(), &[&["--threads", threads, "simulate", "--xosc", out], &CUT_OUT[..]].concat());
         let mut files: Vec<_> = std::fs::read_dir(dir.path().join(out)).unwrap().map(|e| e.unwrap().path()).collect();
         files.sort();
         files.iter().map(|f| (f.file_name().unwrap().to_owned(), std::fs::read(f).unwrap())).collect::<Vec<_>>()
@@ -296,7 +299,7 @@ fn an_ego_of_the_users_own_has_a_start_and_no_path_and_the_others_go_on() {
     let rows = series(&csv);
     let end: f64 = rows.last().unwrap()["t_s"].parse().unwrap();
     for (flags, min_s) in [(&[][..], end + 9.9), (&["--duration", "30"], 30.0)] {
-        good(dir.path(), &[&["export", "xosc", "--ego", "external", "--out", "x"], &CUT_IN[..], flags].concat());
+        good(dir.path(), &[&["simulate", "--xosc", "x", "--ego", "external"], &CUT_IN[..], flags].concat());
         let text = only_scenario(&dir.path().join("x"));
         let (vehicles, all) = played(&text);
         assert!(vehicles["Ego"].path.is_empty());
@@ -314,7 +317,12 @@ fn an_ego_of_the_users_own_has_a_start_and_no_path_and_the_others_go_on() {
         assert_eq!(declared.number("value"), 30.0);
         assert!(text.contains("<AbsoluteTargetSpeed value=\"$ego_speed_mps\"/>"));
     }
-    refused(dir.path(), &[&["export", "xosc", "--duration", "5"], &CUT_IN[..]].concat(), 2, "add --ego external");
+    refused(
+        dir.path(),
+        &[&["simulate", "--xosc", "x", "--duration", "5"], &CUT_IN[..]].concat(),
+        2,
+        "add --ego external",
+    );
 }
 
 /// Ten digits of 20 km/h gave another first gap and another instant of braking.
@@ -324,7 +332,7 @@ fn the_declared_speed_of_an_ego_of_the_users_own_is_the_cases_to_the_bit() {
     for kmh in [7.0, 20.0, 33.3, 50.0, 108.0] {
         let ego = format!("{kmh}km/h");
         let case = ["--category", "cut-in", "--models", "FSM", "--ego-speed", &ego, "--speed", "1m/s", "--gap", "9"];
-        let flags = ["export", "xosc", "--ego", "external", "--out", "x", "--lateral-speed", "1"];
+        let flags = ["simulate", "--xosc", "x", "--ego", "external", "--lateral-speed", "1"];
         good(dir.path(), &[&flags[..], &case].concat());
         let (_, all) = played(&only_scenario(&dir.path().join("x")));
         let declared = all.iter().find(|e| e.attributes.get("name").is_some_and(|n| n == "ego_speed_mps")).unwrap();
@@ -336,7 +344,7 @@ fn the_declared_speed_of_an_ego_of_the_users_own_is_the_cases_to_the_bit() {
 fn a_right_hand_cutter_is_mirrored_and_the_road_holds_everybody() {
     let dir = tempfile::tempdir().unwrap();
     let read = |flags: &[&str]| {
-        good(dir.path(), &[&["export", "xosc", "--out", "x"], &CUT_IN[..], flags].concat());
+        good(dir.path(), &[&["simulate", "--xosc", "x"], &CUT_IN[..], flags].concat());
         let text = only_scenario(&dir.path().join("x"));
         let road = std::fs::read_dir(dir.path().join("x")).unwrap().map(|e| e.unwrap().path());
         let road = road.into_iter().find(|p| p.extension().is_some_and(|e| e == "xodr")).unwrap();
@@ -376,7 +384,7 @@ fn odd_names_are_escaped_and_read_back_and_make_plain_file_names() {
         scenario["id"] = id.into();
         std::fs::write(dir.path().join("s.jsonl"), scenario.to_string() + "\n").unwrap();
         let lane = format!("{id}/S/1.2s/FSM");
-        good(dir.path(), &["export", "xosc", "--scenarios", "s.jsonl", "--lane", &lane, "--out", "x"]);
+        good(dir.path(), &["simulate", "--xosc", "x", "--scenarios", "s.jsonl", "--lane", &lane]);
         let (_, all) = played(&only_scenario(&dir.path().join("x")));
         let property = all.iter().find(|e| e.attributes.get("name").is_some_and(|n| n == "lanesweep.lane")).unwrap();
         assert_eq!(property.attributes["value"], format!("{read}/S/1.2s/FSM"));
@@ -393,14 +401,14 @@ fn odd_names_are_escaped_and_read_back_and_make_plain_file_names() {
 fn what_cannot_be_exported_is_named() {
     let dir = tempfile::tempdir().unwrap();
     let root = dir.path();
-    let xosc = |more: &[&'static str]| [&["export", "xosc"], more].concat();
+    let xosc = |more: &[&'static str]| [&["simulate", "--xosc", "x"], more].concat();
     refused(root, &xosc(&["--lane", "a/S/1.2s/FSM"]), 2, "a key alone does not identify a lane");
     refused(root, &xosc(&["--from", "nowhere", "--lane", "a/S/1.2s/FSM"]), 3, "there is no run here");
     refused(root, &xosc(&["--category", "cut-in", "--models", "FSM"]), 2, "ego_speed: it is missing");
     refused(root, &[&xosc(&["--lane-width", "0"])[..], &CUT_IN].concat(), 2, "not a lane width");
-    refused(root, &[&xosc(&["--out", "file/x"])[..], &CUT_IN].concat(), 0, "");
+    refused(root, &[&["simulate", "--xosc", "file/x"][..], &CUT_IN].concat(), 0, "");
     std::fs::write(root.join("taken"), "").unwrap();
-    refused(root, &[&xosc(&["--out", "taken"])[..], &CUT_IN].concat(), 6, "cannot create the folder");
+    refused(root, &[&["simulate", "--xosc", "taken"][..], &CUT_IN].concat(), 6, "cannot create the folder");
     // The JRC's frozen vehicle: its place before the crash is not in the lane.
     let crash = [
         "--category",
@@ -419,4 +427,7 @@ fn what_cannot_be_exported_is_named() {
         "jrc-2021",
     ];
     refused(root, &[&xosc(&[])[..], &crash].concat(), 3, "hits the one ahead");
+    for flag in ["--ego=external", "--side=left", "--duration=5"] {
+        refused(root, &[&["simulate", flag][..], &CUT_IN].concat(), 2, "--xosc <DIR>");
+    }
 }

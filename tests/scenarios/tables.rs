@@ -87,7 +87,7 @@ proptest! {
 fn a_study_gives_the_same_bytes_from_parquet_and_from_json_lines() {
     let dir = tempfile::tempdir().unwrap();
     let at = dir.path();
-    ran(at, "-q synth rec --synth-recordings 3");
+    ran(at, "-q tracks --convert rec --synth-recordings 3");
     ran(at, "-q mine rec --out s.jsonl");
     ran(at, "-q mine rec --out s.parquet");
     let study = "-q study --backend cpu --config study.keep_plan=never";
@@ -210,7 +210,7 @@ fn check_facts(table: &Read, kind: &str, has_lanes: bool) {
 #[test]
 fn an_ending_that_is_unknown_is_answered_with_the_known_ones_before_any_work() {
     let dir = tempfile::tempdir().unwrap();
-    ran(dir.path(), "-q synth rec --synth-recordings 1 --config generator.duration_s=60");
+    ran(dir.path(), "-q tracks --convert rec --synth-recordings 1 --config generator.duration_s=60");
     for (line, hint) in [
         ("study --rows lanes.xlsx", ".csv, .jsonl or .parquet"),
         ("mine rec --out s.csv", ".jsonl or .parquet"),

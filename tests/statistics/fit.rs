@@ -12,7 +12,7 @@ const SMALL: &str = "--synth-recordings 3 --config generator.duration_s=200";
 fn recordings_their_scenario_file_and_the_generator_give_the_same_densities() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    ran(dir, &format!("-q synth data {SMALL}"));
+    ran(dir, &format!("-q tracks --convert data {SMALL}"));
     let wanted = "--parameterizations 2,e,i";
     let printed = ran(dir, &format!("-q fit --out a {wanted} {SMALL}"));
     ran(dir, &format!("-q fit data --out b --threads 1 {wanted}"));
@@ -38,7 +38,7 @@ fn recordings_their_scenario_file_and_the_generator_give_the_same_densities() {
 fn what_was_driven_comes_with_the_mined_file_from_flags_or_is_unknown() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    ran(dir, &format!("-q synth data {SMALL}"));
+    ran(dir, &format!("-q tracks --convert data {SMALL}"));
     ran(dir, "-q mine data --out scenarios.jsonl");
     let fit = "fit --scenarios scenarios.jsonl --parameterizations 3 --out out.json";
     let exposure = || read_density(&dir.join("out.json")).unwrap().exposure;

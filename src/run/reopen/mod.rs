@@ -6,6 +6,7 @@
 mod record;
 mod traced;
 
+use std::collections::HashSet;
 use std::path::Path;
 
 pub use traced::{TracedCase, TracedLane, TracedLanes};
@@ -146,25 +147,29 @@ impl Reopened {
         work(&study.cases().window(span)?)
     }
 
-    /// The lanes of these keys, or the corresponding lanes of other models.
+    /// The lanes of these keys, each after the lanes to compare it with: the variants `compare` (S, keys of
+    /// parameterizations, or `all`) of its scenario. Each has the given models, or the key's own model if none is given.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a lane that does not exist, is void or is named twice, and for a model that is not in the
-    /// plan.
-    pub fn named(&self, keys: &[String], models: Option<&[ModelId]>) -> Result<Vec<LaneKey>> {
-        let mut found = Vec::new();
+    /// [`Error::Usage`] for a lane, variant or model that does not exist, and for a lane that is void or named twice.
+    pub fn named(&self, keys: &[String], models: Option<&[ModelId]>, compare: &[String]) -> Result<Vec<LaneKey>> {
+        let (mut found, mut named) = (Vec::new(), Vec::new());
         for text in keys {
             let key = self.find(text)?;
-            match models {
-                None => found.push(key),
-                Some(models) => {
-                    for id in models {
-                        found.push(LaneKey { model: self.model(*id)?, ..key });
-                    }
-                }
+            let models = match models {
+                None => vec![key.model],
+                Some(list) => list.iter().map(|id| self.model(*id)).collect::<Result<_>>()?,
+            };
+            for variant in traced::variants(self.plan(), &key, compare)? {
+                let lanes = models.iter().map(|&model| LaneKey { variant, model, ..key });
+                named.extend(lanes.clone().filter(|lane| lane.variant == key.variant));
+                found.extend(lanes);
             }
         }
-        refuse_repeats(|| Place::option("lane"), found.iter().map(|key| (*key, self.plan().key_text(key))))?;
+        refuse_repeats(|| Place::option("lane"), named.iter().map(|key| (*key, self.plan().key_text(key))))?;
+        // Lanes of one scenario are compared with the same lanes.
+        let mut seen = HashSet::new();
+        found.retain(|key| seen.insert(*key));
         Ok(found)
     }
 

@@ -83,23 +83,16 @@ impl TracedCase {
 }
 
 impl Reopened {
-    /// Runs a lane and the lanes to compare it with: first the variants `compare` (S, keys of parameterizations, or
-    /// `all`), then its own. Each runs with the given models, or with the key's own model if none is given.
+    /// Runs lanes; see [`Reopened::named`].
     ///
     /// # Errors
-    /// [`Error::Usage`] for a lane, variant or model that does not exist.
-    pub fn traced(&self, key: &str, models: Option<&[ModelId]>, compare: &[String]) -> Result<TracedLanes> {
-        let key = self.find(key)?;
-        let variants = variants(self.plan(), &key, compare)?;
-        let models = match models {
-            None => vec![key.model],
-            Some(list) => list.iter().map(|id| self.model(*id)).collect::<Result<_>>()?,
-        };
-        let lanes = self.with_cases(&[key], |plan| {
+    /// As [`Reopened::with_cases`].
+    pub fn traced(&self, keys: &[LaneKey]) -> Result<TracedLanes> {
+        let lanes = self.with_cases(keys, |plan| {
             Ok(if self.is_reference {
-                traced::<f64>(plan, key, &variants, &models, None)
+                traced::<f64>(plan, keys, None)
             } else {
-                traced::<f32>(plan, key, &variants, &models, Some(LaneRunner::new(plan)))
+                traced::<f32>(plan, keys, Some(LaneRunner::new(plan)))
             })
         })?;
         let arithmetic = if self.is_reference { "f64" } else { "f32" };
@@ -109,33 +102,28 @@ impl Reopened {
     }
 }
 
-fn traced<R: Real>(
-    plan: &LanePlan,
-    key: LaneKey,
-    variants: &[usize],
-    models: &[usize],
-    reference: Option<LaneRunner<'_, f64>>,
-) -> Vec<TracedLane> {
+fn traced<R: Real>(plan: &LanePlan, keys: &[LaneKey], reference: Option<LaneRunner<'_, f64>>) -> Vec<TracedLane> {
     let runner = LaneRunner::<R>::new(plan);
-    let mut all = Vec::new();
-    for &variant in variants {
-        for &model in models {
-            let key = LaneKey { variant, model, ..key };
-            let (of, by) = (&plan.blocks[key.block].variants[variant], plan.models[model].name());
-            let name = match (variants.len() > 1, models.len() > 1) {
-                (true, true) => format!("{of}, {by}"),
-                (true, false) => of.clone(),
-                _ => by.to_owned(),
-            };
-            let reference = reference.as_ref().map(|runner| runner.run(&key));
-            all.push(TracedLane { key: plan.key_text(&key), name, trace: runner.trace(&key), reference });
+    // A name says in what the lanes differ.
+    let parts = |text: &str| text.rsplitn(4, '/').map(str::to_owned).collect::<Vec<_>>();
+    let texts: Vec<String> = keys.iter().map(|key| plan.key_text(key)).collect();
+    let differs = |at: usize| texts.iter().any(|text| parts(text)[at] != parts(&texts[0])[at]);
+    let differing: Vec<usize> = (0..4).rev().filter(|at| differs(*at)).collect();
+    let lane = |(key, text): (&LaneKey, &String)| {
+        let of = parts(text);
+        let name = differing.iter().map(|at| of[*at].clone()).collect::<Vec<_>>().join(", ");
+        TracedLane {
+            name: if name.is_empty() { of[0].clone() } else { name },
+            trace: runner.trace(key),
+            reference: reference.as_ref().map(|runner| runner.run(key)),
+            key: text.clone(),
         }
-    }
-    all
+    };
+    keys.iter().zip(&texts).map(lane).collect()
 }
 
 /// The variants to compare with, in the plan's order, then the lane's own.
-fn variants(plan: &LanePlan, key: &LaneKey, compare: &[String]) -> Result<Vec<usize>> {
+pub(super) fn variants(plan: &LanePlan, key: &LaneKey, compare: &[String]) -> Result<Vec<usize>> {
     let names = &plan.blocks[key.block].variants;
     let mut variants = Vec::new();
     refuse_repeats(|| Place::option("compare"), compare.iter().map(|name| (name.trim(), name.trim())))?;

@@ -226,7 +226,8 @@ fn nothing_in(folder: &Path) -> Result<Inputs> {
 
 fn unknown(path: &Path) -> Error {
     if path.extension().is_some_and(|ending| ending == "xosc") {
-        let help = "give recordings; a scenario file is a .jsonl file, and `export` writes OpenSCENARIO only";
+        let help =
+            "give recordings; a scenario file is a .jsonl file, and OpenSCENARIO is written by `simulate`, not read";
         return Error::input(Place::file(path), "an OpenSCENARIO file is no recording", help);
     }
     let columns = match tracks::columns_of(path) {

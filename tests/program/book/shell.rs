@@ -7,7 +7,7 @@ use super::markdown::Document;
 pub struct Called {
     /// `study`, …
     pub verb: String,
-    /// The verb of a verb: `xosc` of `export xosc`.
+    /// The verb of a verb: `show` of `config show`.
     pub inner: Option<String>,
     /// `--out`, `-q`, …
     pub flags: Vec<String>,
@@ -83,8 +83,7 @@ fn called(arguments: &[String]) -> Option<Called> {
     let is_number = |word: &str| word.trim_start_matches('-').starts_with(|c: char| c.is_ascii_digit() || c == '.');
     let flags = arguments.iter().filter(|word| word.len() > 1 && word.starts_with('-') && !is_number(word));
     let flags = flags.map(|word| word.split('=').next().unwrap_or_default().to_owned()).collect();
-    let has_inner = ["config", "export"].contains(&verb.as_str());
-    let inner = arguments.iter().skip_while(|word| *word != verb).nth(1).filter(|_| has_inner).cloned();
+    let inner = arguments.iter().skip_while(|word| *word != verb).nth(1).filter(|_| verb == "config").cloned();
     Some(Called { verb: verb.clone(), inner, flags })
 }
 

@@ -56,7 +56,7 @@ pub fn inventory(dir: &Path) -> Result<Inventory> {
     let found = prefixes(dir)?;
     let unfinished = crate::support::run_folder::unfinished(dir).unwrap_or_default();
     if unfinished.iter().any(|name| name.ends_with(SUFFIXES[0])) {
-        let problem = "`synth`, or a conversion by `tracks`, did not finish here, so recordings are missing";
+        let problem = "`tracks` did not finish writing here, so recordings are missing";
         let help = "repeat that command, which completes the folder, or remove the folder";
         return Err(Error::input(Place::file(dir), problem, help));
     }
@@ -84,7 +84,7 @@ pub fn inventory(dir: &Path) -> Result<Inventory> {
     Ok(inventory)
 }
 
-/// File that `lanesweep synth` writes beside its recordings, for readers and for folders of versions without marks in
+/// File that `lanesweep tracks` writes beside synthetic recordings, for readers and for folders of versions without marks in
 /// the recordings.
 pub const SYNTHETIC_MARKER: &str = "SYNTHETIC.txt";
 

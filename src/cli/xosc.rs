@@ -1,0 +1,108 @@
+//! `--xosc` of `simulate`: lanes as OpenSCENARIO files for other simulators.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::arguments::{choices, from_arguments};
+use super::case_flags::time_s;
+use crate::engine::LaneKey;
+use crate::report::openscenario::{Concrete, EgoMotion, PlayOptions, concrete_lanes, export_folder};
+use crate::run::reopen::Reopened;
+use crate::scenario::{Scenario, Side};
+use crate::support::files::check_folder;
+use crate::support::readable::counted;
+use crate::{Error, Place, Result};
+
+/// OpenSCENARIO files of the lanes.
+#[derive(Debug, Args)]
+pub(super) struct XoscFlags {
+    /// Also write ASAM OpenSCENARIO XML 1.2 with OpenDRIVE roads
+    ///
+    /// Every lane becomes NNN-KEY.xosc and NNN-KEY.xodr in this folder; index.csv lists them with their outcomes. The
+    /// other vehicles follow their own motion, step by step.
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    xosc: Option<PathBuf>,
+    /// Driver of the ego in --xosc
+    #[arg(long, value_enum, default_value_t, help_heading = "Output", hide_short_help = true)]
+    ego: EgoFlag,
+    /// End of the scenario with --ego external [default: 10 s after the lane's last event and end]
+    #[arg(long, value_name = "s", value_parser = time_s, help_heading = "Output", hide_short_help = true)]
+    duration: Option<f64>,
+    /// Side in --xosc that the other vehicle comes from or leaves to [default: the scenario's, else left]
+    #[arg(long, value_enum, help_heading = "Output", hide_short_help = true)]
+    side: Option<SideFlag>,
+}
+
+from_arguments!(XoscFlags { xosc, ego, side } parsed { duration: time_s });
+choices!(EgoFlag, SideFlag);
+
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+enum EgoFlag {
+    /// The ego follows the path that the driver model drove
+    #[default]
+    Model,
+    /// Your own controller drives the ego: only its position and speed at the start are written
+    External,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum SideFlag {
+    Left,
+    Right,
+}
+
+impl XoscFlags {
+    /// The options of the files, if they are asked for; checks their folder.
+    pub(super) fn options(&self, lane_width_m: Option<f64>) -> Result<Option<PlayOptions>> {
+        let Some(dir) = &self.xosc else { return Ok(None) };
+        let refused = |flag, problem: String, help| Err(Error::usage(Place::item(flag), problem, help));
+        let ego = match self.ego {
+            EgoFlag::Model => EgoMotion::Model,
+            EgoFlag::External => EgoMotion::External,
+        };
+        if self.duration.is_some() && ego == EgoMotion::Model {
+            let problem = "the ego follows the driver model, and its path ends with the lane".to_owned();
+            return refused("--duration", problem, "add --ego external, or leave out --duration");
+        }
+        if let Some(duration) = self.duration.filter(|d| !(*d > 0.0 && *d <= 3600.0)) {
+            let problem = format!("{duration} s is out of range");
+            return refused("--duration", problem, "give seconds above 0 and at most 3600");
+        }
+        if let Some(width) = lane_width_m.filter(|w| !(1.0..=20.0).contains(w)) {
+            let problem = format!("{width} m is not a lane width");
+            return refused("--lane-width", problem, "give 1 to 20 m, such as 3.5");
+        }
+        check_folder(dir)?;
+        let side = self.side.map(|side| match side {
+            SideFlag::Left => Side::Left,
+            SideFlag::Right => Side::Right,
+        });
+        Ok(Some(PlayOptions { ego, duration_s: self.duration, side, lane_width_m }))
+    }
+
+    /// Writes the files, if they are asked for.
+    pub(super) fn write(&self, played: &[Concrete]) -> Result<()> {
+        let Some(dir) = &self.xosc else { return Ok(()) };
+        let rows = export_folder(dir, played)?;
+        tracing::info!("{} written to {}; index.csv lists them", counted(rows.len(), "scenario"), dir.display());
+        Ok(())
+    }
+}
+
+/// The scenarios of lanes; `mined` have sizes, side and lane width.
+pub(super) fn played(
+    reopened: &Reopened,
+    keys: &[LaneKey],
+    mined: &[Scenario],
+    options: &PlayOptions,
+) -> Result<Vec<Concrete>> {
+    let (scenarios, are_lengths_known) = concrete_lanes(reopened, keys, mined, options)?;
+    if !are_lengths_known {
+        tracing::warn!(
+            "a study's plan has only the sum of two lengths: the ego gets the profile's length, the others the \
+             remainder; gaps and contacts do not change (--scenarios FILE has the lengths)"
+        );
+    }
+    Ok(scenarios)
+}
