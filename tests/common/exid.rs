@@ -131,24 +131,30 @@ impl Plain {
                 let time = (track.first_frame + k as i64) as f64 / recording.frame_rate_hz;
                 let speed = libm::hypot(at.velocity[0], at.velocity[1]);
                 let class = if track.class == VehicleClass::Truck { "truck" } else { "car" };
-                let numbers = [
-                    time,
-                    at.x,
-                    at.y,
-                    at.heading.to_degrees(),
-                    speed,
-                    at.velocity[0],
-                    at.velocity[1],
-                    track.length_m,
-                    track.width_m,
-                ];
-                let mut row = vec![track.id.to_string()];
-                row.extend(numbers.iter().map(|number| format!("{number:.4}")));
-                row.push(class.to_owned());
-                rows.push(row);
+                let ([vx, vy], heading) = (at.velocity, at.heading.to_degrees());
+                let numbers = [time, at.x, at.y, heading, speed, vx, vy, track.length_m, track.width_m];
+                let numbers = numbers.iter().map(|number| format!("{number:.4}"));
+                rows.push([track.id.to_string()].into_iter().chain(numbers).chain([class.to_owned()]).collect());
             }
         }
         Plain { header: names.map(str::to_owned).to_vec(), rows }
+    }
+
+    /// A table as a file has it.
+    pub fn of_text(text: &str) -> Plain {
+        let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
+        Plain { header: lines.next().unwrap(), rows: lines.collect() }
+    }
+
+    /// The number in a row's column.
+    pub fn number(&self, row: usize, name: &str) -> f64 {
+        self.rows[row][self.at(name)].parse().unwrap()
+    }
+
+    /// Adds to the numbers of a column in some rows.
+    pub fn shift(&mut self, rows: &[usize], name: &str, by: f64) {
+        let at = self.at(name);
+        rows.iter().for_each(|row| self.rows[*row][at] = (self.number(*row, name) + by).to_string());
     }
 
     /// Position of a column.

@@ -6,6 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use lanesweep::Result;
+use lanesweep::support::plausibility::Implausible;
 use lanesweep::traffic::trajectory::highd::{self, HighdFiles};
 use lanesweep::traffic::trajectory::{Carriageway, Loaded, Recording, Track, VehicleClass};
 
@@ -84,18 +85,26 @@ impl Texts {
 
     /// Reads them as the recording `01`.
     pub fn read(&self) -> Result<Loaded> {
-        read_bytes([self.tracks.as_bytes(), self.tracks_meta.as_bytes(), self.recording_meta.as_bytes()])
+        self.read_checked(Implausible::Accepted)
+    }
+
+    pub fn read_checked(&self, implausible: Implausible) -> Result<Loaded> {
+        read_checked([&self.tracks, &self.tracks_meta, &self.recording_meta].map(|text| text.as_bytes()), implausible)
     }
 }
 
 /// Reads three files of these contents (tracks, tracksMeta, recordingMeta) as the recording `01`.
 pub fn read_bytes(contents: [&[u8]; 3]) -> Result<Loaded> {
+    read_checked(contents, Implausible::Accepted)
+}
+
+fn read_checked(contents: [&[u8]; 3], implausible: Implausible) -> Result<Loaded> {
     let dir = tempfile::tempdir().unwrap();
     let files = HighdFiles::named(dir.path(), "01");
     for (path, content) in [&files.tracks, &files.tracks_meta, &files.recording_meta].into_iter().zip(contents) {
         fs::write(path, content).unwrap();
     }
-    highd::read(&files)
+    highd::read_checked(&files, implausible)
 }
 
 /// The table with one field replaced; lines are counted from 1 and include the header.

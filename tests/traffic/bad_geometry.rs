@@ -1,11 +1,12 @@
 //! Recordings whose numbers are plausible one by one, but not beside one another: a mirrored axis, another reference point.
 
+use crate::common::exid::Plain;
 use crate::common::small::{self, Texts, cruising};
 
+use lanesweep::Error;
 use lanesweep::support::plausibility::Implausible;
-use lanesweep::traffic::trajectory::highd::{self, HighdFiles};
-use lanesweep::traffic::trajectory::{Loaded, Recording};
-use lanesweep::{Error, Result};
+use lanesweep::traffic::trajectory::Recording;
+use lanesweep::traffic::trajectory::highd;
 
 /// Ten vehicles in five lanes of both directions, 2.4 s; each sways across its lane.
 fn traffic() -> Recording {
@@ -25,35 +26,21 @@ fn traffic() -> Recording {
     recording
 }
 
-fn read(texts: &Texts, implausible: Implausible) -> Result<Loaded> {
-    let dir = tempfile::tempdir().unwrap();
-    let files = HighdFiles::named(dir.path(), "01");
-    std::fs::write(&files.tracks, &texts.tracks).unwrap();
-    std::fs::write(&files.tracks_meta, &texts.tracks_meta).unwrap();
-    std::fs::write(&files.recording_meta, &texts.recording_meta).unwrap();
-    highd::read_checked(&files, implausible)
-}
-
 /// The recording with a column of `tracks` made anew from its value and the height of the box.
 fn changed(texts: &Texts, column: &str, change: impl Fn(f64, f64) -> f64) -> Texts {
-    let names: Vec<&str> = texts.tracks.lines().next().unwrap().split(',').collect();
-    let at = |name: &str| names.iter().position(|other| *other == name).unwrap();
-    let (column, height) = (at(column), at("height"));
-    let row = |line: &str| {
-        let mut fields: Vec<String> = line.split(',').map(str::to_owned).collect();
-        let value = |at: usize| fields[at].parse::<f64>().unwrap();
-        fields[column] = format!("{:.2}", change(value(column), value(height)));
-        fields.join(",")
-    };
-    let (header, rows) = texts.tracks.split_once('\n').unwrap();
-    let rows: Vec<String> = rows.lines().map(row).collect();
-    Texts { tracks: format!("{header}\n{}\n", rows.join("\n")), ..texts.clone() }
+    let mut tracks = Plain::of_text(&texts.tracks);
+    let at = tracks.at(column);
+    for row in 0..tracks.rows.len() {
+        let [value, height] = [column, "height"].map(|name| tracks.number(row, name));
+        tracks.rows[row][at] = format!("{:.2}", change(value, height));
+    }
+    Texts { tracks: tracks.text(), ..texts.clone() }
 }
 
 #[test]
 fn good_geometry_says_nothing() {
     let texts = Texts::of(&traffic());
-    assert_eq!(read(&texts, Implausible::Refused).unwrap().notes, [""; 0]);
+    assert_eq!(texts.read_checked(Implausible::Refused).unwrap().notes, [""; 0]);
 }
 
 #[test]
@@ -74,7 +61,7 @@ fn a_mirrored_axis_and_a_wrong_reference_point_are_named_with_vehicle_and_frame(
         ("a lane beside", changed(&texts, "y", |y, _| y + 3.6), &["10 of 10", "outside the lane that `laneId`"]),
     ];
     for (what, texts, says) in cases {
-        let error: Error = read(&texts, Implausible::Refused).expect_err(what);
+        let error: Error = texts.read_checked(Implausible::Refused).expect_err(what);
         let text = error.to_string().replace('`', "");
         for words in says {
             assert!(text.contains(&words.replace('`', "")), "{what}: `{words}` is not in: {text}");
@@ -83,7 +70,7 @@ fn a_mirrored_axis_and_a_wrong_reference_point_are_named_with_vehicle_and_frame(
         let help = error.help().unwrap();
         let advice = ["it points down", "lane markings", "option `accept_implausible`"];
         assert!(advice.iter().all(|words| help.contains(words)), "{what}: {help}");
-        let notes = read(&texts, Implausible::Accepted).unwrap().notes;
+        let notes = texts.read_checked(Implausible::Accepted).unwrap().notes;
         assert!(!notes.is_empty(), "{what}: accepted without a word");
     }
 }
@@ -97,7 +84,7 @@ fn a_single_vehicle_outside_its_lane_and_boxes_that_overlap_are_warnings() {
     recording.tracks[5].s_m = ahead_m.iter().map(|s_m| s_m + 3.0).collect();
     recording.tracks[5].v_s_mps = recording.tracks[0].v_s_mps.clone();
     recording.tracks[1].d_m.iter_mut().for_each(|d_m| *d_m -= 5.0);
-    let notes = read(&Texts::of(&recording), Implausible::Refused).unwrap().notes;
+    let notes = Texts::of(&recording).read_checked(Implausible::Refused).unwrap().notes;
     let has = |words: &[&str]| notes.iter().any(|note| words.iter().all(|word| note.contains(word)));
     assert!(has(&["1 of 10 vehicles", "vehicle 2 at frame 25", "laneId"]), "{notes:?}");
     assert!(has(&["1 pair(s) of vehicles overlap", "vehicles 1 and 6 at frame 25"]), "{notes:?}");

@@ -6,7 +6,7 @@ use crate::common::small::{self, Texts, edit_line, with_field, with_repeated_lin
 use lanesweep::Error;
 use lanesweep::support::plausibility::Implausible;
 use lanesweep::traffic::trajectory::Track;
-use lanesweep::traffic::trajectory::highd::{self, HighdFiles};
+use lanesweep::traffic::trajectory::highd;
 use proptest::prelude::*;
 
 /// The message has all of these and comes with advice.
@@ -193,11 +193,8 @@ fn small_speeds_backwards_are_noise_that_is_counted_and_larger_ones_an_error() {
         };
         let loaded = with(0.49).read().unwrap();
         let noise: Vec<&String> = loaded.notes.iter().filter(|note| note.contains("is taken as 0, once")).collect();
-        assert!(
-            noise.len() == 1 && noise[0].contains(&format!("line {line}, column `xVelocity`")),
-            "{:?}",
-            loaded.notes
-        );
+        let place = format!("line {line}, column `xVelocity`");
+        assert!(noise.len() == 1 && noise[0].contains(&place), "{:?}", loaded.notes);
         assert!(loaded.recording.tracks.iter().flat_map(|track| &track.v_s_mps).all(|v| *v >= 0.0));
         for speed in [0.5, 20.0] {
             let says = ["01_tracks.csv", &format!("line {line}"), "column `xVelocity`", "drives backwards"];
@@ -217,12 +214,10 @@ fn a_speed_that_contradicts_the_positions_and_a_jump_are_refused_unless_accepted
     for spoil in spoilt {
         let mut wrong = recording.clone();
         spoil(&mut wrong.tracks[0]);
-        let dir = tempfile::tempdir().unwrap();
-        highd::write(dir.path(), &wrong).unwrap();
-        let files = HighdFiles::named(dir.path(), "01");
-        let error = highd::read_checked(&files, Implausible::Refused).unwrap_err();
+        let texts = Texts::of(&wrong);
+        let error = texts.read_checked(Implausible::Refused).unwrap_err();
         assert_says(&error, &["01_tracks.csv", "`xVelocity`", "vehicle 1 at frame", "its speed is", "but it moves by"]);
-        let accepted = highd::read(&files).unwrap();
+        let accepted = texts.read().unwrap();
         assert!(accepted.notes.iter().any(|note| note.contains("its speed is")), "{:?}", accepted.notes);
     }
     // A small jump is said.
@@ -242,23 +237,14 @@ fn what_no_road_has_is_refused_unless_accepted_and_then_told() {
         ("tracksMeta", 3, "height", "0.05", "column `height`"),
         ("recordingMeta", 2, "upperLaneMarkings", lines, "lane width"),
     ] {
-        let dir = tempfile::tempdir().unwrap();
         let mut texts = Texts::small();
         let text = text_of(&mut texts, name);
         *text = with_field(text, line, column, value);
         let says = [&format!("line {line}"), says];
-        let files = HighdFiles::named(dir.path(), "01");
-        for (path, text) in [
-            (&files.tracks, &texts.tracks),
-            (&files.tracks_meta, &texts.tracks_meta),
-            (&files.recording_meta, &texts.recording_meta),
-        ] {
-            fs::write(path, text).unwrap();
-        }
-        let error = highd::read_checked(&files, Implausible::Refused).expect_err(column);
+        let error = texts.read_checked(Implausible::Refused).expect_err(column);
         assert_says(&error, &says);
         assert!(error.help().unwrap().contains("option `accept_implausible`"), "{column}");
-        let notes = highd::read_checked(&files, Implausible::Accepted).unwrap().notes;
+        let notes = texts.read().unwrap().notes;
         assert!(notes.iter().any(|note| says.iter().all(|said| note.contains(said))), "{column}: {notes:?}");
     }
 }

@@ -141,9 +141,9 @@ fn what_a_time_without_a_unit_is_taken_for_is_said() {
     let path = dir.path().join("own.csv");
     fs::write(&path, with_times(|t| format!("{:.0}", 1_740_823_200_000.0 + 1000.0 * t)).text()).unwrap();
     let generic = Preset::load("generic").unwrap();
-    let about =
-        tracks::read_tracks(&TrackFile { path, id: "own".to_owned() }, &generic).unwrap().remove(0).understanding;
-    assert!(crate::tracks::fact(&about, "columns").contains("time = t (ms since 1970)"), "{:?}", about.facts);
+    let read = tracks::read_tracks(&TrackFile { path, id: "own".to_owned() }, &generic).unwrap();
+    let about = &read[0].understanding;
+    assert!(crate::tracks::fact(about, "columns").contains("time = t (ms since 1970)"), "{:?}", about.facts);
 }
 
 #[test]
@@ -229,13 +229,10 @@ fn parquet_with_gzip_or_lz4_and_instants_is_the_table() {
     };
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("own.parquet");
-    for codec in [Compression::GZIP(GzipLevel::default()), Compression::LZ4, Compression::LZ4_RAW, Compression::SNAPPY]
-    {
-        crate::common::tables::made::write(
-            &path,
-            table.header.iter().map(|name| (name.as_str(), column(name))).collect(),
-            codec,
-        );
+    let gzip = Compression::GZIP(GzipLevel::default());
+    for codec in [gzip, Compression::LZ4, Compression::LZ4_RAW, Compression::SNAPPY] {
+        let columns = table.header.iter().map(|name| (name.as_str(), column(name))).collect();
+        crate::common::tables::made::write(&path, columns, codec);
         assert!(from_frame_0(read("own.parquet", &fs::read(&path).unwrap()).unwrap()) == right, "{codec:?}");
     }
 }

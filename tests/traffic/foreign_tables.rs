@@ -8,11 +8,11 @@ use std::path::Path;
 use lanesweep::support::plausibility::Implausible;
 use lanesweep::traffic::mining::{MiningOptions, mine, mine_folder};
 use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
-use lanesweep::traffic::trajectory::tracks::{self, Finding, LoadedTracks, Understanding};
-use lanesweep::traffic::trajectory::{Inputs, Loaded, Track, VehicleClass};
+use lanesweep::traffic::trajectory::tracks::{self, LoadedTracks, Understanding};
+use lanesweep::traffic::trajectory::{Inputs, Recording, Track, VehicleClass};
 
 use crate::common::exid::{self, Plain};
-use crate::tracks::{fact, generated, says};
+use crate::tracks::{fact, generated, load, says};
 
 fn table() -> Plain {
     Plain::of(&generated(), 5)
@@ -25,6 +25,11 @@ fn table_of(seed: u64) -> Plain {
 
 fn understood(table: &Plain) -> lanesweep::Result<Understanding> {
     crate::tracks::understood(table, &|_| ())
+}
+
+/// The first finding that refuses a table.
+fn grave(about: &Understanding) -> &str {
+    about.findings.iter().find(|finding| finding.is_grave).map_or("", |finding| &finding.text)
 }
 
 fn read(table: &Plain) -> lanesweep::Result<LoadedTracks> {
@@ -136,9 +141,8 @@ fn one_speed_that_cannot_be_is_refused_by_vehicle_and_frame() {
         let row = table.rows.iter_mut().find(forward).unwrap();
         let (vehicle, frame) = (row[0].clone(), (5.0 * row[t].parse::<f64>().unwrap()).round());
         row[vx] = wrong.to_string();
-        let about = understood(&table).unwrap();
-        let grave = about.findings.iter().find(|finding| finding.is_grave).map_or("", |finding| &finding.text);
-        assert!(grave.contains(&format!("vehicle {vehicle} at frame {frame}: its speed is {wrong} m/s")), "{grave}");
+        let (about, says) = (understood(&table).unwrap(), format!("vehicle {vehicle} at frame {frame}: its speed is"));
+        assert!(grave(&about).contains(&format!("{says} {wrong} m/s")), "{:?}", about.findings);
     }
 }
 
@@ -148,12 +152,10 @@ fn a_peak_of_one_sample_beyond_what_is_physical_is_refused() {
     let mut recording = generated();
     recording.tracks.truncate(60);
     let mut table = Plain::of(&recording, 1).without(&["heading", "speed"]);
-    let (vx, row) = (table.at("vx"), 300);
-    let speed: f64 = table.rows[row][vx].parse().unwrap();
-    table.rows[row][vx] = format!("{:.4}", speed - 4.0 * speed.signum());
+    let speed = table.number(300, "vx");
+    table.shift(&[300], "vx", -4.0 * speed.signum());
     let about = understood(&table).unwrap();
-    let grave = about.findings.iter().find(|finding| finding.is_grave).map_or("", |finding| &finding.text);
-    assert!(grave.contains("beyond what is physical for an acceleration"), "{grave}");
+    assert!(grave(&about).contains("beyond what is physical for an acceleration"), "{:?}", about.findings);
 }
 
 /// The rows of each vehicle, in the order of time.
@@ -168,19 +170,14 @@ fn a_step_that_no_vehicle_makes_gives_two_tracks_and_is_said() {
     for by_m in [8.0, -60.0] {
         let mut table = with_speeds();
         let tracks = read(&table).unwrap().loaded.recording.tracks.len();
-        let x = table.at("x");
         let rows = rows_by_vehicle(&table);
         let (vehicle, own) = rows.iter().find(|(_, rows)| rows.len() > 60).unwrap();
-        for at in &own[30..] {
-            table.rows[*at][x] = (table.rows[*at][x].parse::<f64>().unwrap() + by_m).to_string();
-        }
+        table.shift(&own[30..], "x", by_m);
         let read = read(&table).unwrap();
         assert_eq!(read.loaded.recording.tracks.len(), tracks + 1, "{by_m}");
         assert!(says(&read.understanding, "1 step(s) that no vehicle makes"), "{by_m}");
-        let said = |finding: &Finding| {
-            finding.text.contains(&format!("split tracks, the first is that of vehicle {vehicle} "))
-        };
-        assert!(read.understanding.findings.iter().any(said), "{by_m}: {:?}", read.understanding.findings);
+        let said = says(&read.understanding, &format!("split tracks, the first is that of vehicle {vehicle} "));
+        assert!(said, "{by_m}: {:?}", read.understanding.findings);
     }
 }
 
@@ -188,18 +185,17 @@ fn a_step_that_no_vehicle_makes_gives_two_tracks_and_is_said() {
 fn a_number_used_again_within_a_gap_that_is_filled_is_another_vehicle_with_its_own_size_and_class() {
     let mut table = with_speeds();
     let all = read(&table).unwrap().loaded.recording.tracks.len();
-    let (t, length, class) = (table.at("t"), table.at("length"), table.at("class"));
+    let class = table.at("class");
     let rows = rows_by_vehicle(&table);
-    let number = |row: usize, column: usize| table.rows[row][column].parse::<f64>().unwrap();
     let follows = |(a, b): &(&Vec<usize>, &Vec<usize>)| {
-        let gap_s = number(b[0], t) - number(a[a.len() - 1], t);
+        let gap_s = table.number(b[0], "t") - table.number(a[a.len() - 1], "t");
         gap_s > 0.1 && gap_s < 0.3 && table.rows[a[0]][class] != table.rows[b[0]][class]
     };
     let pairs = rows.values().flat_map(|a| rows.values().map(move |b| (a, b)));
     let (first, second) = pairs.into_iter().find(follows).unwrap();
     let vehicles = [first[0], second[0]].map(|row| {
         let class = if table.rows[row][class] == "truck" { VehicleClass::Truck } else { VehicleClass::Car };
-        Some((number(row, length), class))
+        Some((table.number(row, "length"), class))
     });
     let key = table.rows[first[0]][0].clone();
     second.iter().for_each(|at| table.rows[*at][0].clone_from(&key));
@@ -216,15 +212,13 @@ fn a_number_used_again_within_a_gap_that_is_filled_is_another_vehicle_with_its_o
 /// A table whose column of accelerations is the change of speed along x, times a factor, plus an offset.
 fn with_accelerations(factor: f64, offset_mps2: f64) -> Plain {
     let mut table = with_speeds();
-    let (vx, t) = (table.at("vx"), table.at("t"));
     let rows = rows_by_vehicle(&table);
     table.header.push("acceleration".to_owned());
-    let number = |table: &Plain, row: usize, column: usize| table.rows[row][column].parse::<f64>().unwrap();
     for own in rows.values() {
         let told = |k: usize| {
             let (a, b) = (own[k.saturating_sub(1)], own[(k + 1).min(own.len() - 1)]);
-            let change = number(&table, b, vx).abs() - number(&table, a, vx).abs();
-            change / (number(&table, b, t) - number(&table, a, t)).max(1e-3)
+            let change = table.number(b, "vx").abs() - table.number(a, "vx").abs();
+            change / (table.number(b, "t") - table.number(a, "t")).max(1e-3)
         };
         let accelerations: Vec<f64> = (0..own.len()).map(|k| factor * told(k) + offset_mps2).collect();
         own.iter().zip(accelerations).for_each(|(row, a)| table.rows[*row].push(format!("{a:.4}")));
@@ -236,10 +230,7 @@ fn with_accelerations(factor: f64, offset_mps2: f64) -> Plain {
 fn numbers_that_fit_one_another_badly_are_told() {
     let scaled = |columns: &[&str], factor: f64| {
         let mut table = with_speeds();
-        for column in columns.iter().map(|name| table.at(name)).collect::<Vec<_>>() {
-            let by = |row: &mut Vec<String>| row[column] = (factor * row[column].parse::<f64>().unwrap()).to_string();
-            table.rows.iter_mut().for_each(by);
-        }
+        columns.iter().for_each(|column| table.map(column, |value, _| factor * value));
         table
     };
     for (table, name, told) in [
@@ -261,12 +252,8 @@ fn numbers_that_fit_one_another_badly_are_told() {
 #[test]
 fn a_lane_change_in_one_step_does_not_split_a_track() {
     let mut table = with_speeds();
-    let y = table.at("y");
     let rows = rows_by_vehicle(&table);
-    let own = rows.values().find(|rows| rows.len() > 60).unwrap();
-    for at in &own[30..] {
-        table.rows[*at][y] = (table.rows[*at][y].parse::<f64>().unwrap() + 3.5).to_string();
-    }
+    table.shift(&rows.values().find(|rows| rows.len() > 60).unwrap()[30..], "y", 3.5);
     assert!(!says(&understood(&table).unwrap(), "no vehicle makes"));
 }
 
@@ -292,12 +279,6 @@ fn recordings_that_are_short_or_have_few_vehicles_are_not_refused_for_that() {
     }
 }
 
-fn load(path: &Path) -> Vec<Loaded> {
-    let (files, problems) = Inputs::of(path, None).unwrap().files();
-    assert!(problems.is_empty(), "{problems:?}");
-    files.iter().flat_map(|file| file.read(Implausible::Refused).unwrap()).collect()
-}
-
 #[test]
 fn a_meta_file_names_a_vehicle_as_a_number_however_it_is_written() {
     let dir = tempfile::tempdir().unwrap();
@@ -306,13 +287,13 @@ fn a_meta_file_names_a_vehicle_as_a_number_however_it_is_written() {
     exid::write(dir.path(), &recording, f64::INFINITY);
     let file = dir.path().join(format!("{}_tracksMeta.csv", recording.id));
     let meta = fs::read_to_string(&file).unwrap();
-    let lorries = recording.tracks.iter().filter(|track| track.class == VehicleClass::Truck).count();
+    let of_lorries = |of: &Recording| of.tracks.iter().filter(|track| track.class == VehicleClass::Truck).count();
+    let lorries = of_lorries(&recording);
     assert!(lorries > 0);
     let read = |meta: &str| {
         fs::write(&file, meta).unwrap();
-        let loaded = load(dir.path()).remove(0);
-        let lorries = loaded.recording.tracks.iter().filter(|track| track.class == VehicleClass::Truck).count();
-        (lorries, loaded.notes.into_iter().find(|note| note.contains("tracksMeta")))
+        let loaded = load(dir.path()).unwrap().remove(0);
+        (of_lorries(&loaded.recording), loaded.notes.into_iter().find(|note| note.contains("tracksMeta")))
     };
     assert_eq!(read(&meta), (lorries, None));
     assert_eq!(read(&meta.replace("\n0,", "\n0,0000")), (lorries, None));
@@ -345,7 +326,7 @@ fn a_second_recording_of_one_name_is_left_out_and_named() {
     }
     let path = dir.path().join("b.csv");
     fs::write(&path, names.text()).unwrap();
-    assert_eq!(load(&path).into_iter().map(|of| of.recording.id).collect::<Vec<_>>(), ["b-x-y", "b-z"]);
+    assert_eq!(load(&path).unwrap().into_iter().map(|of| of.recording.id).collect::<Vec<_>>(), ["b-x-y", "b-z"]);
 }
 
 #[test]

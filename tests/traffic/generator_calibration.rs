@@ -89,6 +89,23 @@ impl Counted {
         self.scenarios.iter().filter(move |s| s.category == category && s.kept)
     }
 
+    /// Rows of the scenarios per data set, of which rates are divided by a factor, and of those kept among found; `spans` of
+    /// a category in the order of the rows.
+    fn rates(&self, table: &mut Table, factor: f64, spans: impl Fn(Category) -> [(f64, f64); 3]) {
+        for (category, published_found, published_kept) in PUBLISHED {
+            let (found, kept) = (self.found(category), self.kept(category).count() as f64);
+            let sets = self.sets * factor;
+            let rows = [
+                ("found per data set", published_found / PUBLISHED_SETS, found / sets),
+                ("kept among found", published_kept / published_found, kept / found),
+                ("kept per data set", published_kept / PUBLISHED_SETS, kept / sets),
+            ];
+            for ((what, published, ours), (low, high)) in rows.into_iter().zip(spans(category)) {
+                table.ratio_row(&format!("{}: {what}", category.label()), published, ours, low, high);
+            }
+        }
+    }
+
     fn traffic(&self, options: &GeneratorOptions) -> Traffic {
         measure(&self.recordings, options.duration_s, options.window_m)
     }
@@ -155,16 +172,7 @@ fn at_rate_factor_one_scenarios_are_as_frequent_as_published() {
     let mut table = Table::new("Rates at rate factor 1 (36 recordings)");
     let crossings = t.crossings as f64 / t.driven_km;
     table.ratio_row("line crossings per vehicle and km", PUBLISHED_CROSSINGS_PER_KM, crossings, 0.8, 1.25);
-    for (category, published_found, published_kept) in PUBLISHED {
-        let (found, kept) = (counted.found(category), counted.kept(category).count() as f64);
-        let name = category.label();
-        let rate = published_found / PUBLISHED_SETS;
-        table.ratio_row(&format!("{name}: found per data set"), rate, found / counted.sets, 0.7, 1.35);
-        let ratio = published_kept / published_found;
-        table.ratio_row(&format!("{name}: kept among found"), ratio, kept / found, 0.6, 1.5);
-        let rate = published_kept / PUBLISHED_SETS;
-        table.ratio_row(&format!("{name}: kept per data set"), rate, kept / counted.sets, 0.65, 1.5);
-    }
+    counted.rates(&mut table, 1.0, |_| [(0.7, 1.35), (0.6, 1.5), (0.65, 1.5)]);
     table.finish_but(&["line crossings per vehicle and km", "LVD: kept among found", "LVD: kept per data set"]);
 }
 
@@ -177,23 +185,18 @@ fn the_default_recordings_hold_enough_scenarios_at_the_stated_factor() {
     let mut table = Table::new(&format!("Scenarios of the default recordings (rates divided by the factor {factor})"));
     let crossings = t.crossings as f64 / t.driven_km / factor;
     table.ratio_row("line crossings per vehicle and km", PUBLISHED_CROSSINGS_PER_KM, crossings, 0.75, 1.25);
-    for (category, published_found, published_kept) in PUBLISHED {
-        let (found, kept) = (counted.found(category), counted.kept(category).count() as f64);
-        let name = category.label();
-        table.row(&format!("{name}: found (number)"), "", found, 300.0, 5000.0);
+    for category in Category::ALL {
+        let (name, kept) = (category.label(), counted.kept(category).count() as f64);
+        table.row(&format!("{name}: found (number)"), "", counted.found(category), 300.0, 5000.0);
         table.row(&format!("{name}: kept (number)"), "≥ 150", kept, 150.0, 400.0);
+    }
+    counted.rates(&mut table, factor, |category| {
         // Rates rise a little less than the factor says, since lane changes get in each other's way.
         // Gentle decelerations are not raised: per data set they lie between once and `factor` times.
-        let raised = if category == Category::Lvd { 1.0 / factor } else { 0.5 };
-        let rate = published_found / PUBLISHED_SETS;
-        table.ratio_row(&format!("{name}: found per data set"), rate, found / counted.sets / factor, raised, 1.35);
-        let rate = published_kept / PUBLISHED_SETS;
-        table.ratio_row(&format!("{name}: kept per data set"), rate, kept / counted.sets / factor, 0.5, 1.5);
         // For the same reason more of the found LVDs are kept, at most `factor` times as many.
-        let max = if category == Category::Lvd { factor } else { 1.8 };
-        let ratio = published_kept / published_found;
-        table.ratio_row(&format!("{name}: kept among found"), ratio, kept / found, 0.6, max);
-    }
+        let (raised, max) = if category == Category::Lvd { (1.0 / factor, factor) } else { (0.5, 1.8) };
+        [(raised, 1.35), (0.6, max), (0.5, 1.5)]
+    });
 
     let excess: Vec<f64> = counted.kept(Category::Lvd).filter_map(|s| s.peak_decel).map(|p| p - 2.0).collect();
     table.row("LVD kept: mean excess of the peak over 2 m/s²", "tail", mean(&excess), 0.2, 0.6);
@@ -206,8 +209,8 @@ fn the_default_recordings_hold_enough_scenarios_at_the_stated_factor() {
     table.row("cut-in kept: speed over the ego's, median", "< 0.95", quantile(&slower, 0.5), 0.88, 0.945);
     table.finish_but(&[
         "LVD: kept (number)",
-        "LVD: kept per data set",
         "LVD: kept among found",
+        "LVD: kept per data set",
         "LVD kept: mean excess of the peak over 2 m/s²",
         "LVD kept: share with a peak below 2.5 m/s²",
         "cut-in kept: speed over the ego's, 5 %",

@@ -4,37 +4,13 @@ use crate::common;
 
 use std::fs;
 
+use crate::common::exid::Plain;
 use crate::common::small::Texts;
-use lanesweep::traffic::trajectory::{Carriageway, Recording};
+use lanesweep::traffic::mining::{MiningOptions, mine};
+use lanesweep::traffic::trajectory::{Carriageway, Recording, Track};
 
 /// Length of the road, hundredths of a metre.
 const ROAD: i64 = 42_000;
-
-/// A table whose fields can be changed by column.
-struct Table {
-    columns: Vec<String>,
-    rows: Vec<Vec<String>>,
-}
-
-impl Table {
-    fn of(text: &str) -> Self {
-        let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
-        Table { columns: lines.next().unwrap(), rows: lines.collect() }
-    }
-
-    fn change(&mut self, change: impl Fn(&mut dyn FnMut(&str) -> usize, &mut Vec<String>)) {
-        let columns = &self.columns;
-        let mut at = |name: &str| columns.iter().position(|column| column == name).unwrap();
-        for row in &mut self.rows {
-            change(&mut at, row);
-        }
-    }
-
-    fn text(&self) -> String {
-        let lines = std::iter::once(&self.columns).chain(&self.rows).map(|row| row.join(",") + "\n");
-        lines.collect()
-    }
-}
 
 /// A decimal with two places as an exact number of hundredths.
 fn hundredths(text: &str) -> i64 {
@@ -50,38 +26,28 @@ fn decimal(hundredths: i64) -> String {
 
 /// x' = road − x − width and y' = −y − height, exactly; everything else follows.
 fn turned(texts: &Texts) -> Texts {
-    let mut meta = Table::of(&texts.recording_meta);
-    let mirrored = |cell: &str| {
-        let lines: Vec<String> = cell.split(';').rev().map(|line| decimal(-hundredths(line))).collect();
-        lines.join(";")
+    let mut meta = Plain::of_text(&texts.recording_meta);
+    let [upper, lower] = ["upperLaneMarkings", "lowerLaneMarkings"].map(|name| meta.at(name));
+    let row = &mut meta.rows[0];
+    let lines = (row[upper].split(';').count() + row[lower].split(';').count()) as i64;
+    let mirrored = |cell: &str| -> String {
+        cell.split(';').rev().map(|line| decimal(-hundredths(line))).collect::<Vec<_>>().join(";")
     };
-    meta.change(|at, row| {
-        let (upper, lower) = (at("upperLaneMarkings"), at("lowerLaneMarkings"));
-        (row[upper], row[lower]) = (mirrored(&row[lower]), mirrored(&row[upper]));
-    });
-    let lines: usize = ["upperLaneMarkings", "lowerLaneMarkings"]
-        .map(|name| meta.columns.iter().position(|column| column == name).unwrap())
-        .map(|at| meta.rows[0][at].split(';').count())
-        .iter()
-        .sum();
-    let mut tracks_meta = Table::of(&texts.tracks_meta);
-    tracks_meta.change(|at, row| {
-        let direction = at("drivingDirection");
+    (row[upper], row[lower]) = (mirrored(&row[lower]), mirrored(&row[upper]));
+    let mut tracks_meta = Plain::of_text(&texts.tracks_meta);
+    let direction = tracks_meta.at("drivingDirection");
+    for row in &mut tracks_meta.rows {
         row[direction] = if row[direction] == "1" { "2" } else { "1" }.to_owned();
-    });
-    let mut tracks = Table::of(&texts.tracks);
-    tracks.change(|at, row| {
-        let (length, width) = (hundredths(&row[at("width")]), hundredths(&row[at("height")]));
-        let (x, y) = (at("x"), at("y"));
-        row[x] = decimal(ROAD - hundredths(&row[x]) - length);
-        row[y] = decimal(-hundredths(&row[y]) - width);
-        for name in ["xVelocity", "yVelocity", "xAcceleration", "yAcceleration"] {
-            let column = at(name);
-            row[column] = decimal(-hundredths(&row[column]));
-        }
-        let lane = at("laneId");
-        row[lane] = (lines as i64 + 2 - row[lane].parse::<i64>().unwrap()).to_string();
-    });
+    }
+    let mut tracks = Plain::of_text(&texts.tracks);
+    let [x, y, length, width, lane] = ["x", "y", "width", "height", "laneId"].map(|name| tracks.at(name));
+    let reversed = ["xVelocity", "yVelocity", "xAcceleration", "yAcceleration"].map(|name| tracks.at(name));
+    for row in &mut tracks.rows {
+        row[x] = decimal(ROAD - hundredths(&row[x]) - hundredths(&row[length]));
+        row[y] = decimal(-hundredths(&row[y]) - hundredths(&row[width]));
+        reversed.iter().for_each(|&at| row[at] = decimal(-hundredths(&row[at])));
+        row[lane] = (lines + 2 - row[lane].parse::<i64>().unwrap()).to_string();
+    }
     Texts { tracks: tracks.text(), tracks_meta: tracks_meta.text(), recording_meta: meta.text() }
 }
 
@@ -93,19 +59,14 @@ fn assert_same_traffic(recording: &Recording, turned: &Recording) {
     assert_eq!(recording.tracks.len(), turned.tracks.len());
     for (a, b) in recording.tracks.iter().zip(&turned.tracks) {
         let (a, b) = (a.clone(), b.clone());
-        let fixed =
-            |t: &lanesweep::traffic::trajectory::Track| (t.id, t.class, t.first_frame, t.length_m, t.width_m, t.len());
+        let fixed = |t: &Track| (t.id, t.class, t.first_frame, t.length_m, t.width_m, t.len());
         assert_eq!(fixed(&a), fixed(&b));
         assert_eq!(a.carriageway, 1 - b.carriageway);
         assert_eq!((a.lane, a.v_s_mps, a.v_d_mps, a.a_s_mps2), (b.lane, b.v_s_mps, b.v_d_mps, b.a_s_mps2));
         // Forward positions start from the other end of the road: s for +x is road + s of the turned one.
         let shift_m = if a.carriageway == 1 { ROAD as f64 / 100.0 } else { -ROAD as f64 / 100.0 };
-        for (a, b) in a.s_m.iter().zip(&b.s_m) {
-            assert!((a - b - shift_m).abs() < 1e-9, "{a} {b}");
-        }
-        for (a, b) in a.d_m.iter().zip(&b.d_m) {
-            assert!((a - b).abs() < 1e-9, "{a} {b}");
-        }
+        assert!(a.s_m.iter().zip(&b.s_m).all(|(a, b)| (a - b - shift_m).abs() < 1e-9), "{}", a.id);
+        assert!(a.d_m.iter().zip(&b.d_m).all(|(a, b)| (a - b).abs() < 1e-9), "{}", a.id);
     }
 }
 
@@ -115,14 +76,18 @@ fn a_recording_turned_by_180_degrees_is_the_same_traffic() {
     assert_same_traffic(&texts.read().unwrap().recording, &turned(&texts).read().unwrap().recording);
 }
 
+/// Recording 04 has an on-ramp, so its carriageways have unequal lane counts.
 #[test]
-fn a_sumo_recording_with_unequal_lane_counts_turned_by_180_degrees_is_the_same_traffic() {
+fn sumo_recordings_turned_by_180_degrees_are_the_same_traffic_with_the_same_scenarios() {
     let Some(dir) = common::sumo_recordings() else { return };
-    let text = |name: &str| fs::read_to_string(dir.join(name)).unwrap();
-    let texts = Texts {
-        tracks: text("04_tracks.csv"),
-        tracks_meta: text("04_tracksMeta.csv"),
-        recording_meta: text("04_recordingMeta.csv"),
-    };
-    assert_same_traffic(&texts.read().unwrap().recording, &turned(&texts).read().unwrap().recording);
+    for id in ["01", "02", "03", "04"] {
+        let text = |name: &str| fs::read_to_string(dir.join(format!("{id}_{name}.csv"))).unwrap();
+        let [tracks, tracks_meta, recording_meta] = ["tracks", "tracksMeta", "recordingMeta"].map(text);
+        let texts = Texts { tracks, tracks_meta, recording_meta };
+        let [there, back] = [&texts, &turned(&texts)].map(|texts| texts.read().unwrap().recording);
+        assert_same_traffic(&there, &back);
+        let [there, back] = [there, back].map(|recording| mine(&recording, &MiningOptions::default()));
+        assert!(!there.scenarios.is_empty());
+        assert_eq!((there.data_sets, there.scenarios), (back.data_sets, back.scenarios), "recording {id}");
+    }
 }

@@ -75,28 +75,6 @@ fn lane_changes_are_those_of_the_published_formula() {
     }
 }
 
-#[test]
-fn a_mirrored_track_has_the_mirrored_lane_changes() {
-    for case in cases("activity_lateral_target.json") {
-        let fs = case["fs"].as_f64().unwrap();
-        let lane = Lane { left_m: case["line_left"].as_f64().unwrap(), right_m: case["line_right"].as_f64().unwrap() };
-        let mirror = Lane { left_m: -lane.right_m, right_m: -lane.left_m };
-        let d = numbers(&case["target_dy"]);
-        let mirrored: Vec<f64> = d.iter().map(|d| -d).collect();
-        for lc_end in [LaneChangeEnd::Published, LaneChangeEnd::Observed] {
-            let options = LateralOptions { lc_end, ..LateralOptions::default() };
-            let here = lane_changes(&d, lane, fs, &options);
-            let there = lane_changes(&mirrored, mirror, fs, &options);
-            assert_eq!(here.len(), there.len());
-            for (a, b) in here.iter().zip(&there) {
-                assert_eq!((a.start, a.crossing, a.end), (b.start, b.crossing, b.end), "{}", case["name"]);
-                assert_eq!(a.kind.is_in(), b.kind.is_in());
-                assert_ne!(a.kind, b.kind);
-            }
-        }
-    }
-}
-
 /// The observed end comes when the window behind is calm, the published one when the window ahead is:
 /// the motion is over in between.
 #[test]

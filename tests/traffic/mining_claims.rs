@@ -3,7 +3,7 @@
 use lanesweep::scenario::{Category, Scenario, Side};
 use lanesweep::traffic::mining::lateral::{LaneChangeKind, lane_changes};
 use lanesweep::traffic::mining::longitudinal::{Longitudinal, longitudinal_events};
-use lanesweep::traffic::mining::{LateralOptions, LongitudinalOptions, MiningOptions, mine};
+use lanesweep::traffic::mining::{LaneChangeEnd, LateralOptions, LongitudinalOptions, MiningOptions, mine};
 use lanesweep::traffic::trajectory::{Carriageway, Lane, NO_LANE, Recording, Track, VehicleClass};
 use proptest::prelude::*;
 
@@ -148,17 +148,12 @@ fn cut_ins_that_are_fast_or_far_are_found_but_not_kept() {
 }
 
 #[test]
-fn who_changes_lane_is_cut_in_by_nobody() {
-    let mut cars = cut_in_from(LEFT);
-    cars[0] = cars[0].changing(RIGHT, 3.0, 7.0);
-    assert!(scenarios(&cars, 25.0).iter().all(|s| s.category != Category::CutIn));
-}
-
-#[test]
-fn a_vehicle_that_only_touches_the_line_cuts_in_nobody() {
+fn who_changes_lane_is_cut_in_by_nobody_and_who_only_touches_the_line_cuts_in_nobody() {
+    let [ego, cutter] = cut_in_from(LEFT);
+    let both_change = [ego.changing(RIGHT, 3.0, 7.0), cutter];
+    assert!(scenarios(&both_change, 25.0).iter().all(|s| s.category != Category::CutIn));
     // Its centre stays left of the line by half a metre.
-    let cars = [car(0.0, EGO, MIDDLE), car(45.0, 27.0, LEFT).changing(0.5 * LANE_M + 0.5, 3.0, 7.0)];
-    assert!(scenarios(&cars, 25.0).is_empty());
+    assert!(scenarios(&[ego, cutter.changing(0.5 * LANE_M + 0.5, 3.0, 7.0)], 25.0).is_empty());
 }
 
 #[test]
@@ -217,16 +212,11 @@ fn a_leader_beyond_two_seconds_is_none() {
 }
 
 #[test]
-fn a_vehicle_that_travels_less_than_100_m_has_no_data_set() {
-    let recording = moved_traffic(&[car(0.0, 8.0, MIDDLE), car(50.0, 9.0, MIDDLE)], 25.0, (0.0, 0.0));
-    assert_eq!(mine(&recording, &MiningOptions::default()).data_sets, 1);
-}
-
-#[test]
-fn an_empty_recording_holds_nothing() {
-    let recording = moved_traffic(&[], 25.0, (0.0, 0.0));
-    let mined = mine(&recording, &MiningOptions::default());
-    assert!(mined.scenarios.is_empty() && mined.data_sets == 0);
+fn a_vehicle_that_travels_less_than_100_m_has_no_data_set_and_an_empty_recording_none_at_all() {
+    for (cars, data_sets) in [(&[car(0.0, 8.0, MIDDLE), car(50.0, 9.0, MIDDLE)][..], 1), (&[], 0)] {
+        let mined = mine(&moved_traffic(cars, 25.0, (0.0, 0.0)), &MiningOptions::default());
+        assert!(mined.scenarios.is_empty() && mined.data_sets == data_sets, "{}", mined.data_sets);
+    }
 }
 
 /// All three categories at once, to compare runs with each other.
@@ -333,10 +323,14 @@ proptest! {
         }
         prop_assert!(changes.windows(2).all(|c| c[0].end <= c[1].start));
         let mirrored: Vec<f64> = d.iter().map(|d| -d).collect();
-        let there = lane_changes(&mirrored, lane, 25.0, &LateralOptions::default());
-        let spans = |c: &[lanesweep::traffic::mining::lateral::LaneChange]| -> Vec<(usize, usize, usize, bool)> {
-            c.iter().map(|c| (c.start, c.crossing, c.end, c.kind.is_in())).collect()
-        };
-        prop_assert_eq!(spans(&changes), spans(&there));
+        for lc_end in [LaneChangeEnd::Published, LaneChangeEnd::Observed] {
+            let of = |d: &[f64]| lane_changes(d, lane, 25.0, &LateralOptions { lc_end, ..LateralOptions::default() });
+            let (here, there) = (of(&d), of(&mirrored));
+            prop_assert_eq!(here.len(), there.len());
+            for (a, b) in here.iter().zip(&there) {
+                prop_assert_eq!((a.start, a.crossing, a.end), (b.start, b.crossing, b.end));
+                prop_assert!(a.kind.is_in() == b.kind.is_in() && a.kind != b.kind);
+            }
+        }
     }
 }

@@ -1,12 +1,11 @@
-//! Mining of whole recordings against an independent implementation of the same definitions, and of
-//! recordings turned by 180°.
+//! Mining of whole recordings against an independent implementation of the same definitions.
 
 use crate::common;
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use lanesweep::scenario::{Category, Scenario, read_scenarios, write_scenarios};
+use lanesweep::scenario::{Category, Scenario, read_scenarios};
 use lanesweep::traffic::mining::{Mined, MiningOptions, count, mine};
 use lanesweep::traffic::trajectory::highd::{HighdFiles, read};
 
@@ -16,9 +15,7 @@ fn mined(dir: &Path, id: &str) -> Mined {
 
 /// Scenarios of some recordings by id.
 fn by_id(dir: &Path, recordings: &[&str]) -> BTreeMap<String, Scenario> {
-    let all = recordings.iter().flat_map(|id| mined(dir, id).scenarios);
-    let by_id: BTreeMap<String, Scenario> = all.map(|s| (s.id.clone(), s)).collect();
-    by_id
+    recordings.iter().flat_map(|id| mined(dir, id).scenarios).map(|s| (s.id.clone(), s)).collect()
 }
 
 /// `found` rounds to the golden value, to as many decimals as that has but at most four.
@@ -37,10 +34,7 @@ fn sumo_recordings_hold_the_scenarios_that_a_second_implementation_finds() {
     let mut compared = 0;
     for row in golden.deserialize::<BTreeMap<String, String>>() {
         let row = row.unwrap();
-        let id = format!(
-            "{}_{}_{}_{}_{}",
-            row["recording"], row["category"], row["ego_id"], row["target_id"], row["frame0"]
-        );
+        let id = ["recording", "category", "ego_id", "target_id", "frame0"].map(|name| row[name].as_str()).join("_");
         let s = ours.remove(&id).unwrap_or_else(|| panic!("{id} not found"));
         assert_eq!(s.frame1.to_string(), row["frame1"], "{id}");
         assert_eq!(s.lead_id.map_or(String::new(), |l| l.to_string()), row["lead_id"], "{id}");
@@ -88,88 +82,4 @@ fn sumo_counts_equal_those_of_a_second_implementation() {
     assert_eq!(found_and_kept(Category::CutIn), (26, 3));
     assert_eq!(found_and_kept(Category::CutOut), (34, 9));
     assert_eq!(found_and_kept(Category::Lvd), (249, 43));
-}
-
-#[test]
-fn mined_scenarios_survive_the_scenario_file() {
-    let Some(dir) = common::sumo_recordings() else { return };
-    let folder = tempfile::tempdir().unwrap();
-    for id in ["01", "04"] {
-        let found = mined(&dir, id).scenarios;
-        let path = folder.path().join(id);
-        write_scenarios(&path, &found).unwrap();
-        assert_eq!(read_scenarios(&path).unwrap(), found);
-    }
-}
-
-/// Turns the three files of a recording by 180° about some point, as a camera held the other way round
-/// would have recorded them, in the two decimals of the format.
-fn turn(from: &Path, into: &Path, id: &str) {
-    const WIDTH: f64 = 421.37;
-    const HEIGHT: f64 = 57.93;
-    let files = |name: &str| (from.join(format!("{id}_{name}.csv")), into.join(format!("{id}_{name}.csv")));
-    let fixed = |x: f64| format!("{:.2}", if x == 0.0 { 0.0 } else { x });
-    let number = |text: &str| text.parse::<f64>().unwrap();
-
-    let markings = |text: &str| text.split(';').map(number).collect::<Vec<f64>>();
-    let turned = |lines: &[f64]| lines.iter().rev().map(|y| fixed(HEIGHT - y)).collect::<Vec<_>>().join(";");
-    let mut lines = 0;
-    let (path, target) = files("recordingMeta");
-    each_row(&path, &target, |row| {
-        let (upper, lower) = (markings(&row["upperLaneMarkings"]), markings(&row["lowerLaneMarkings"]));
-        lines = upper.len() + lower.len();
-        row.insert("upperLaneMarkings".into(), turned(&lower));
-        row.insert("lowerLaneMarkings".into(), turned(&upper));
-    });
-    let (path, target) = files("tracksMeta");
-    each_row(&path, &target, |row| {
-        let direction = 3 - row["drivingDirection"].parse::<u8>().unwrap();
-        row.insert("drivingDirection".into(), direction.to_string());
-    });
-    let (path, target) = files("tracks");
-    each_row(&path, &target, |row| {
-        for (at, size, extent) in [("x", "width", WIDTH), ("y", "height", HEIGHT)] {
-            let value = extent - number(&row[at]) - number(&row[size]);
-            row.insert(at.into(), fixed(value));
-        }
-        for name in ["xVelocity", "yVelocity", "xAcceleration", "yAcceleration", "precedingXVelocity"] {
-            let value = fixed(-number(&row[name]));
-            row.insert(name.into(), value);
-        }
-        let lane = lines + 2 - row["laneId"].parse::<usize>().unwrap();
-        row.insert("laneId".into(), lane.to_string());
-    });
-}
-
-/// Copies a table with its rows changed; columns keep their order.
-fn each_row(from: &Path, into: &Path, mut change: impl FnMut(&mut BTreeMap<String, String>)) {
-    let mut reader = csv::Reader::from_path(from).unwrap();
-    let header = reader.headers().unwrap().clone();
-    let mut writer = csv::Writer::from_path(into).unwrap();
-    writer.write_record(&header).unwrap();
-    for record in reader.records() {
-        let record = record.unwrap();
-        let mut row: BTreeMap<String, String> =
-            header.iter().zip(&record).map(|(h, v)| (h.to_owned(), v.to_owned())).collect();
-        change(&mut row);
-        writer.write_record(header.iter().map(|h| &row[h])).unwrap();
-    }
-    writer.flush().unwrap();
-}
-
-/// Recording 04 has an on-ramp, so its carriageways have unequal lane counts.
-#[test]
-fn a_recording_turned_by_180_degrees_gives_the_same_scenarios() {
-    let Some(dir) = common::sumo_recordings() else { return };
-    let folder = tempfile::tempdir().unwrap();
-    for id in ["01", "02", "03", "04"] {
-        turn(&dir, folder.path(), id);
-        let (original, turned) = (mined(&dir, id), mined(folder.path(), id));
-        assert!(!original.scenarios.is_empty());
-        assert_eq!(original.data_sets, turned.data_sets, "recording {id}");
-        for (a, b) in original.scenarios.iter().zip(&turned.scenarios) {
-            assert_eq!(a, b);
-        }
-        assert_eq!(original.scenarios.len(), turned.scenarios.len(), "recording {id}");
-    }
 }

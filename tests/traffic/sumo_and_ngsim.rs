@@ -7,7 +7,9 @@ use std::path::Path;
 use lanesweep::scenario::{Category, read_scenario_file, write_scenarios};
 use lanesweep::support::plausibility::Implausible;
 use lanesweep::traffic::mining::{Collection, MiningOptions, mine_folder, mine_inputs};
-use lanesweep::traffic::trajectory::{Inputs, Loaded, Track, VehicleClass};
+use lanesweep::traffic::trajectory::{Inputs, Track, VehicleClass};
+
+use crate::tracks::load;
 
 const LANE_WIDTH_M: f64 = 3.5;
 const RATE_HZ: f64 = 10.0;
@@ -33,6 +35,29 @@ fn place((_, _, lane, front_m, speed, change): Driven, time_s: f64, change_s: f6
     (front_m + speed * time_s, y_m, (y_m / LANE_WIDTH_M) as usize)
 }
 
+/// Where a vehicle is at a time.
+struct Sample {
+    frame: usize,
+    time: f64,
+    /// Index of the vehicle.
+    at: usize,
+    vehicle: Driven,
+    x: f64,
+    y: f64,
+    lane: usize,
+}
+
+/// The vehicles at every time, in the order of time.
+fn samples(vehicles: &[Driven], seconds: usize, change_s: f64) -> Vec<Sample> {
+    let of_time = |(frame, time): (usize, f64)| {
+        vehicles.iter().enumerate().map(move |(at, &vehicle)| {
+            let (x, y, lane) = place(vehicle, time, change_s);
+            Sample { frame, time, at, vehicle, x, y, lane }
+        })
+    };
+    times(seconds).enumerate().flat_map(of_time).collect()
+}
+
 fn times(seconds: usize) -> impl Iterator<Item = f64> {
     (0..seconds * RATE_HZ as usize).map(|k| k as f64 / RATE_HZ)
 }
@@ -42,23 +67,12 @@ fn fcd(vehicles: &[Driven], change_s: f64) -> String {
     let header = "timestep_time;vehicle_id;vehicle_x;vehicle_y;vehicle_angle;vehicle_type;vehicle_speed;vehicle_lane;\
                   vehicle_length;vehicle_width";
     // Tables of time steps have a row for a step without vehicles.
-    let mut text = format!("{header}\n0.00;;;;;;;;;\n");
-    for time in times(14) {
-        for vehicle in vehicles {
-            let (name, kind, .., speed, _) = *vehicle;
-            let (x, y, lane) = place(*vehicle, time, change_s);
-            let size = if kind == "lorry" { "7.1;2.4" } else { "4.3;1.8" };
-            let _ = writeln!(text, "{time:.2};{name};{x:.2};{y:.2};90.00;{kind};{speed:.2};E0_{lane};{size}");
-        }
-    }
-    text
-}
-
-fn load(path: &Path) -> lanesweep::Result<Vec<Loaded>> {
-    let (files, problems) = Inputs::of(path, None)?.files();
-    assert!(problems.is_empty(), "{problems:?}");
-    let read: lanesweep::Result<Vec<Vec<Loaded>>> = files.iter().map(|file| file.read(Implausible::Refused)).collect();
-    Ok(read?.into_iter().flatten().collect())
+    let row = |sample: &Sample| {
+        let Sample { time, x, y, lane, vehicle: (name, kind, .., speed, _), .. } = sample;
+        let size = if *kind == "lorry" { "7.1;2.4" } else { "4.3;1.8" };
+        format!("{time:.2};{name};{x:.2};{y:.2};90.00;{kind};{speed:.2};E0_{lane};{size}\n")
+    };
+    format!("{header}\n0.00;;;;;;;;;\n") + &samples(vehicles, 14, change_s).iter().map(row).collect::<String>()
 }
 
 fn gap_m(ego: &Track, lead: &Track) -> f64 {
@@ -133,27 +147,14 @@ fn a_lane_change_of_one_step_is_refused_from_recordings_and_from_files_alike() {
 /// Rows of NGSIM's table in three periods: frames and vehicles begin again at 1, and vehicle 5 is a lorry in the second period only.
 fn three_periods() -> Vec<String> {
     let foot = 0.3048;
-    let mut rows = Vec::new();
-    for period in 0..3_u64 {
-        for (frame, time) in times(14).enumerate() {
-            for (at, vehicle) in CUT_IN.into_iter().enumerate() {
-                let (x, y, _) = place(vehicle, time, 4.0);
-                let is_lorry = vehicle.1 == "lorry" && (at != 4 || period == 1);
-                let (length, width, class) = if is_lorry { (54.1, 8.2, 3) } else { (15.1, 5.9, 2) };
-                rows.push(format!(
-                    "{},{},{},{:.3},{:.3},{length},{width},{class},{:.3},0,{},us-101",
-                    at + 1,
-                    frame + 1,
-                    1_118_846_979_700 + 900_000 * period + 100 * frame as u64,
-                    -y / foot,
-                    x / foot,
-                    vehicle.4 / foot,
-                    3 - (y / LANE_WIDTH_M) as usize
-                ));
-            }
-        }
-    }
-    rows
+    let row = |period: u64, Sample { frame, at, vehicle, x, y, lane, .. }: Sample| {
+        let is_lorry = vehicle.1 == "lorry" && (at != 4 || period == 1);
+        let size = if is_lorry { "54.1,8.2,3" } else { "15.1,5.9,2" };
+        let time_ms = 1_118_846_979_700 + 900_000 * period + 100 * frame as u64;
+        let (x, y, speed, lane) = (x / foot, -y / foot, vehicle.4 / foot, 3 - lane);
+        format!("{},{},{time_ms},{y:.3},{x:.3},{size},{speed:.3},0,{lane},us-101", at + 1, frame + 1)
+    };
+    (0..3).flat_map(|period| samples(&CUT_IN, 14, 4.0).into_iter().map(move |of| row(period, of))).collect()
 }
 
 #[test]
@@ -208,11 +209,8 @@ fn a_number_that_comes_back_after_a_pause_is_another_vehicle() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("t.csv");
     let mut text = "id,time,x,y,speed,length,width,class\n".to_owned();
-    for time in times(12) {
-        for (at, vehicle) in CUT_IN.into_iter().enumerate() {
-            let (x, y, _) = place(vehicle, time, 4.0);
-            let _ = writeln!(text, "{at},{time:.2},{x:.2},{y:.2},{},4.5,1.8,car", vehicle.4);
-        }
+    for Sample { at, time, x, y, vehicle, .. } in samples(&CUT_IN, 12, 4.0) {
+        let _ = writeln!(text, "{at},{time:.2},{x:.2},{y:.2},{},4.5,1.8,car", vehicle.4);
     }
     // Number 2 again, of a lorry.
     for time in times(12) {
@@ -237,12 +235,9 @@ fn scenarios_have_the_frames_and_the_names_of_vehicles_of_their_file() {
     let path = dir.path().join("t.csv");
     let table = |first: usize, step: usize| {
         let mut text = "id,frame,time,x,y,speed,length,width,class\n".to_owned();
-        for (k, time) in times(14).enumerate() {
-            for vehicle in CUT_IN {
-                let (x, y, _) = place(vehicle, time, 4.0);
-                let frame = first + step * k;
-                let _ = writeln!(text, "{},{frame},{time:.2},{x:.2},{y:.2},{},4.5,1.8,car", vehicle.0, vehicle.4);
-            }
+        for Sample { frame, time, x, y, vehicle, .. } in samples(&CUT_IN, 14, 4.0) {
+            let (name, frame, speed) = (vehicle.0, first + step * frame, vehicle.4);
+            let _ = writeln!(text, "{name},{frame},{time:.2},{x:.2},{y:.2},{speed},4.5,1.8,car");
         }
         text
     };

@@ -20,12 +20,18 @@ pub fn generated() -> Recording {
     generate_one(&options, 0).unwrap()
 }
 
-fn load(path: &Path, preset: &str) -> Vec<Loaded> {
-    let inputs = Inputs::of(path, None).unwrap();
-    assert_eq!(inputs.preset().map(|preset| preset.name.as_str()), Some(preset));
-    let (files, problems) = inputs.files();
-    assert!(problems.is_empty());
-    files.iter().flat_map(|file| file.read(Implausible::Refused).unwrap()).collect()
+/// The recordings of a file or folder, none of which is in doubt.
+pub fn load(path: &Path) -> lanesweep::Result<Vec<Loaded>> {
+    let (files, problems) = Inputs::of(path, None)?.files();
+    assert!(problems.is_empty(), "{problems:?}");
+    let read: lanesweep::Result<Vec<_>> = files.iter().map(|file| file.read(Implausible::Refused)).collect();
+    Ok(read?.into_iter().flatten().collect())
+}
+
+fn load_exid(dir: &Path) -> Loaded {
+    let detected = Inputs::of(dir, None).unwrap().preset().map(|preset| preset.name.clone());
+    assert_eq!(detected.as_deref(), Some("exid"));
+    load(dir).unwrap().remove(0)
 }
 
 /// Scenarios by category, ego and target, with their first frames.
@@ -58,9 +64,9 @@ fn exid_files_of_a_curved_road_have_the_scenarios_of_the_straight_one() {
     for radius_m in [f64::INFINITY, 2500.0] {
         let dir = tempfile::tempdir().unwrap();
         exid::write(dir.path(), &recording, radius_m);
-        let loaded = load(dir.path(), "exid");
-        let read = &loaded[0].recording;
-        assert_eq!(read.tracks.len(), recording.tracks.len(), "{:?}", loaded[0].notes);
+        let loaded = load_exid(dir.path());
+        let read = &loaded.recording;
+        assert_eq!(read.tracks.len(), recording.tracks.len(), "{:?}", loaded.notes);
         // Frames begin at 0 instead of 1.
         let [all, near, _] = matched(&recording, read, 1, 1);
         let [of_read, ..] = matched(read, &recording, -1, 1);
@@ -81,12 +87,9 @@ fn merging() -> Recording {
     let mut add = |id: u32, s_m: f64, speed: f64, d: &dyn Fn(f64) -> f64| {
         let s: Vec<f64> = (0..frames).map(|k| s_m + speed * f64::from(k) / 25.0).collect();
         let d_m: Vec<f64> = s.iter().map(|s| d(*s)).collect();
-        let v_d_mps: Vec<f64> = (0..frames as usize)
-            .map(|k| {
-                let (a, b) = (k.saturating_sub(1), (k + 1).min(frames as usize - 1));
-                (d_m[b] - d_m[a]) * 25.0 / (b - a) as f64
-            })
-            .collect();
+        let ends = |k: usize| (k.saturating_sub(1), (k + 1).min(frames as usize - 1));
+        let across = |(a, b): (usize, usize)| (d_m[b] - d_m[a]) * 25.0 / (b - a) as f64;
+        let v_d_mps: Vec<f64> = (0..frames as usize).map(ends).map(across).collect();
         tracks.push(Track {
             id,
             class: VehicleClass::Car,
@@ -121,7 +124,7 @@ fn merging() -> Recording {
 fn merging_from_an_on_ramp_of_a_curved_road_is_a_cut_in() {
     let dir = tempfile::tempdir().unwrap();
     exid::write(dir.path(), &merging(), 900.0);
-    let loaded = &load(dir.path(), "exid")[0];
+    let loaded = load_exid(dir.path());
     let lines = &loaded.recording.carriageways[0].lane_lines_m;
     assert_eq!(lines.len(), 4, "{lines:?}");
     let mined = mine(&loaded.recording, &MiningOptions::default());
@@ -217,10 +220,9 @@ fn wrong_units_axes_and_reference_points_are_found() {
     // One direction, no lateral speed, no lorry: nothing can tell, and this is said.
     let mut one_way = bare();
     let x = one_way.at("x");
-    let first: BTreeMap<String, f64> =
-        one_way.rows.iter().rev().map(|row| (row[0].clone(), row[x].parse().unwrap())).collect();
-    let last: BTreeMap<String, f64> =
-        one_way.rows.iter().map(|row| (row[0].clone(), row[x].parse().unwrap())).collect();
+    let place = |row: &Vec<String>| (row[0].clone(), row[x].parse::<f64>().unwrap());
+    let first: BTreeMap<_, _> = one_way.rows.iter().rev().map(place).collect();
+    let last: BTreeMap<_, _> = one_way.rows.iter().map(place).collect();
     one_way.rows.retain(|row| last[&row[0]] > first[&row[0]]);
     let class = one_way.at("class");
     one_way.rows.iter_mut().for_each(|row| "car".clone_into(&mut row[class]));
@@ -233,25 +235,23 @@ fn wrong_units_axes_and_reference_points_are_found() {
 #[test]
 fn the_preset_says_what_a_wrong_file_means() {
     let table = Plain::of(&generated(), 5);
-    let mut wrong = table.clone();
-    wrong.map("y", |v, _| -v);
-    wrong.map("vy", |v, _| -v);
-    wrong.map("heading", |v, _| -v);
+    let [mut wrong, mut corner, mut front] = [&table, &table, &table].map(Plain::clone);
+    ["y", "vy", "heading"].iter().for_each(|column| wrong.map(column, |v, _| -v));
     assert!(!understood(&wrong, &|_| ()).unwrap().is_usable());
-    let about = understood(&wrong, &|preset| preset.axes.y = tracks::Side::Right).unwrap();
-    assert!(about.is_usable(), "{:?}", about.findings);
-    let mut corner = table.clone();
-    let (length, width) = (corner.at("length"), corner.at("width"));
-    corner.map("x", |v, row| v - 0.5 * row[length].parse::<f64>().unwrap());
-    corner.map("y", |v, row| v - 0.5 * row[width].parse::<f64>().unwrap());
-    let about = understood(&corner, &|preset| preset.reference = tracks::Reference::Corner).unwrap();
-    assert!(about.is_usable(), "{:?}", about.findings);
-    let mut front = table;
-    let heading = front.at("heading");
-    let cosine = |row: &[String]| libm::cos(row[heading].parse::<f64>().unwrap().to_radians());
-    front.map("x", |v, row| v + 0.5 * cosine(row) * row[length].parse::<f64>().unwrap());
-    let about = understood(&front, &|preset| preset.reference = tracks::Reference::Front).unwrap();
-    assert!(about.is_usable(), "{:?}", about.findings);
+    let [length, width, heading] = ["length", "width", "heading"].map(|name| table.at(name));
+    let number = |row: &[String], at: usize| row[at].parse::<f64>().unwrap();
+    corner.map("x", |v, row| v - 0.5 * number(row, length));
+    corner.map("y", |v, row| v - 0.5 * number(row, width));
+    front.map("x", |v, row| v + 0.5 * libm::cos(number(row, heading).to_radians()) * number(row, length));
+    let says: [(Plain, fn(&mut Preset)); 3] = [
+        (wrong, |preset| preset.axes.y = Side::Right),
+        (corner, |preset| preset.reference = Reference::Corner),
+        (front, |preset| preset.reference = Reference::Front),
+    ];
+    for (table, change) in says {
+        let about = understood(&table, &change).unwrap();
+        assert!(about.is_usable(), "{:?}", about.findings);
+    }
 }
 
 /// What a newcomer's mistakes in a preset did in silence.
@@ -438,19 +438,14 @@ fn every_preset_reads_its_own_format_and_finds_mistakes_in_it() {
     let recording = generated();
     let foot = 1.0 / 0.3048;
     let right: Mistake = &|_, value, _| value;
+    let times = |factor: f64, is_wrong: bool, value: f64| if is_wrong { factor * value } else { value };
     let mistakes: [(&str, Mistake); 4] = [
-        ("positions times 3.28", &|role, value, _| {
-            if matches!(role, Role::X | Role::Y) { foot * value } else { value }
-        }),
+        ("positions times 3.28", &|role, value, _| times(foot, matches!(role, Role::X | Role::Y), value)),
         ("speeds times 3.6", &|role, value, _| {
-            let is_speed = matches!(role, Role::Speed | Role::ForwardSpeed | Role::XSpeed);
-            if is_speed { 3.6 * value } else { value }
+            times(3.6, matches!(role, Role::Speed | Role::ForwardSpeed | Role::XSpeed), value)
         }),
-        ("everything times 3.28", &|role, value, _| {
-            let is_other = matches!(role, Role::Time | Role::Heading);
-            if is_other { value } else { foot * value }
-        }),
-        ("y flipped", &|role, value, _| if role == Role::Y { -value } else { value }),
+        ("everything times 3.28", &|role, value, _| times(foot, !matches!(role, Role::Time | Role::Heading), value)),
+        ("y flipped", &|role, value, _| times(-1.0, role == Role::Y, value)),
     ];
     let names = Preset::names().filter(|name| *name != tracks::HIGHD);
     let presets = names.map(|name| Preset::load(name).unwrap());
@@ -475,18 +470,14 @@ fn every_preset_reads_its_own_format_and_finds_mistakes_in_it() {
         };
         let about = understood(right).unwrap();
         assert!(about.is_usable(), "{}: {:?}", preset.name, about.findings);
-        let lanes: Vec<&str> =
-            about.facts.iter().filter(|(name, _)| *name == "lanes").map(|(_, text)| text.as_str()).collect();
+        let lanes = about.facts.iter().filter(|(name, _)| *name == "lanes");
+        let lanes: Vec<&str> = lanes.map(|(_, text)| text.as_str()).collect();
         assert_eq!(lanes.len(), 2, "{}", preset.name);
         // Bands of 12 ft are no lanes of 3.5 m.
         let is_right = lanes.iter().all(|text| text.contains(": 3 lanes"));
         assert!(is_right || preset.lanes.width_m.is_some(), "{}: {lanes:?}", preset.name);
         let has_speed = [Role::Speed, Role::ForwardSpeed, Role::XSpeed].iter().any(|r| preset.columns.contains_key(r));
-        for (name, mistake) in mistakes {
-            let is_without = name.starts_with("speeds") && !has_speed;
-            if is_without {
-                continue;
-            }
+        for (name, mistake) in mistakes.into_iter().filter(|(name, _)| has_speed || !name.starts_with("speeds")) {
             match understood(mistake) {
                 Ok(about) => assert!(!about.is_usable(), "{}, {name}: {:?}", preset.name, about.findings),
                 Err(error) => assert!(error.help().is_some(), "{error}"),
