@@ -186,6 +186,16 @@ fn at_the_boundary_of_a_driver_or_of_the_answer_it_is_not_called_robust() {
     assert!(code == 0 && answer.contains("the answer is robust; the verdict of CCHDM changes with "), "{answer}");
 }
 
+/// By hand: 60 behind 100 km/h that brakes at 6.8 m/s², 3 m ahead; the TTC is 2 s at 2.382 s (`lanes/domain_claims.rs`), and
+/// CCHDM brakes 0.75 s later.
+#[test]
+fn braking_on_a_gap_that_opened_begins_a_delay_after_the_reaction() {
+    let sheet = json("cut-in 60 100 3 1.5 --acceleration=-6.8");
+    let models = sheet["profiles"][0]["models"].as_array().unwrap();
+    let cchdm = models.iter().find(|model| model["model"] == "CCHDM").unwrap();
+    assert!((cchdm["braking_s"].as_f64().unwrap() - 3.132).abs() < 0.011, "{cchdm}");
+}
+
 /// The columns of a contact: its kind, and the ego's speed minus the other's, with its sign.
 #[test]
 fn a_contact_has_its_kind_and_the_sign_of_its_closing_speed() {

@@ -72,6 +72,9 @@ fn the_unit_may_stand_in_the_name_or_in_the_value() {
         file(dir, "case.toml", &format!("category = \"cut-in\"\n{keys}\n"));
         let by_toml = document(dir, "check case.toml --profiles paper");
         assert_eq!(by_toml["profiles"], by_flags["profiles"], "{keys}");
+        let simulate = "--models RSS --profile paper";
+        let lane = flags.replace("check", "simulate").replace("--profiles paper", simulate);
+        assert_eq!(ran(dir, &format!("simulate --case-file case.toml {simulate}")), ran(dir, &lane), "{keys}");
         let pairs: Vec<(&str, &str)> = keys.lines().map(|line| line.split_once(" = ").unwrap()).collect();
         let names: Vec<&str> = pairs.iter().map(|(name, _)| *name).collect();
         let values: Vec<&str> = pairs.iter().map(|(_, value)| value.trim_matches('"')).collect();

@@ -5,6 +5,7 @@ use crate::common::program::{json, names, ran, refused, said};
 use crate::common::{self, program};
 
 use std::path::Path;
+use std::process::Stdio;
 
 /// The golden scenarios as `s.jsonl`.
 fn scenarios(dir: &Path) {
@@ -50,6 +51,18 @@ fn what_the_run_before_left_goes_and_what_no_record_lists_stays() {
     assert!(!out.join("radar-cut-in.svg").exists() && !out.join("reference.csv").exists());
     assert!(out.join("radar-lvd.svg").exists());
     mine.iter().for_each(|name| assert_eq!(read(&out.join(name)), "mine"));
+}
+
+#[test]
+fn a_reader_that_goes_away_loses_no_result() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    scenarios(dir);
+    let study = program::words("study --scenarios s.jsonl --categories lvd --out out");
+    let mut run = program::command(dir, &study).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    drop(run.stdout.take());
+    let (code, said) = program::ended(run);
+    assert!(code == 0 && !said.contains("panicked") && dir.join("out/run.json").exists(), "{code}: {said}");
 }
 
 #[test]
