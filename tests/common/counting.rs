@@ -31,24 +31,11 @@ thread_local! {
     static COUNT: Cell<OperationCount> = const { Cell::new(OperationCount { additions: 0, multiplications: 0, divisions: 0, comparisons: 0, unbounded: 0 }) };
 }
 
-/// Kinds of operations that are counted.
-enum Operation {
-    Addition,
-    Multiplication,
-    Division,
-    Comparison,
-}
-
-fn count(operation: Operation) {
+/// Adds one to a counter.
+fn count(counter: impl FnOnce(&mut OperationCount) -> &mut u64) {
     COUNT.with(|cell| {
         let mut now = cell.get();
-        let counter = match operation {
-            Operation::Addition => &mut now.additions,
-            Operation::Multiplication => &mut now.multiplications,
-            Operation::Division => &mut now.divisions,
-            Operation::Comparison => &mut now.comparisons,
-        };
-        *counter += 1;
+        *counter(&mut now) += 1;
         cell.set(now);
     });
 }
@@ -65,9 +52,9 @@ fn result(value: f64) -> Counting {
 }
 
 fn compare(a: Counting, b: Counting) {
-    count(Operation::Comparison);
+    count(|now| &mut now.comparisons);
     if !(a.0.is_finite() && b.0.is_finite()) {
-        COUNT.with(|cell| cell.set(OperationCount { unbounded: cell.get().unbounded + 1, ..cell.get() }));
+        count(|now| &mut now.unbounded);
     }
 }
 
@@ -96,21 +83,21 @@ impl Counting {
 impl Add for Counting {
     type Output = Self;
     fn add(self, other: Self) -> Self {
-        count(Operation::Addition);
+        count(|now| &mut now.additions);
         result(self.0 + other.0)
     }
 }
 impl Sub for Counting {
     type Output = Self;
     fn sub(self, other: Self) -> Self {
-        count(Operation::Addition);
+        count(|now| &mut now.additions);
         result(self.0 - other.0)
     }
 }
 impl Mul for Counting {
     type Output = Self;
     fn mul(self, other: Self) -> Self {
-        count(Operation::Multiplication);
+        count(|now| &mut now.multiplications);
         result(self.0 * other.0)
     }
 }
@@ -149,7 +136,7 @@ impl Real for Counting {
         Counting(f64::from(step))
     }
     fn exact_div(self, divisor: Self) -> Self {
-        count(Operation::Division);
+        count(|now| &mut now.divisions);
         Counting(self.0 / divisor.0)
     }
     fn floor_to_step(self) -> u32 {

@@ -1,13 +1,15 @@
 //! Lanes to compare backends with: profiles in which every option takes every form, and plans.
 #![allow(dead_code)] // every test binary uses its own part
 
-use lanesweep::engine::LanePlan;
+use super::mined::scenarios_of;
 use lanesweep::engine::verify::{RandomOptions, ThresholdOptions, random_plan, threshold_plan};
+use lanesweep::engine::{Constants, LaneCase, LanePlan, Observer, Outcome, Start};
 use lanesweep::model::criterion::{BtnContact, BtnForm, LateralGate};
+use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::{CutOutEvaluated, CutOutTarget, Profile};
+use lanesweep::model::scalar::Real;
 use lanesweep::run::study::{StudyOptions, plan_study};
-use lanesweep::traffic::mining::{MiningOptions, mine_generated};
-use lanesweep::traffic::trajectory::generator::GeneratorOptions;
+use lanesweep::scenario::{Case, Tables};
 
 /// Every form of every option that decides how a lane runs, and other time steps and caps.
 pub fn forms() -> Vec<Profile> {
@@ -58,6 +60,20 @@ pub fn forms() -> Vec<Profile> {
     profiles
 }
 
+/// One lane of a case by itself, in the arithmetic of its start; an observer sees its steps.
+pub fn run_case<R: Real>(
+    profile: &Profile,
+    case: &Case,
+    model: ModelId,
+    start: Start<R>,
+    observer: &mut impl Observer<R>,
+) -> Outcome<f64> {
+    let mut tables = Tables::default();
+    let lane = LaneCase::encode(case, profile, &mut tables);
+    let constants = Constants::<R>::resolve(profile, case.category);
+    constants.run(model, &lane.cast(), &tables.cast(), start, observer).widen()
+}
+
 /// Random lanes of each model and category.
 pub fn random(profile: &Profile, lanes: u64) -> LanePlan {
     random_plan(profile, &RandomOptions { lanes_per_model_and_category: lanes, ..Default::default() }).unwrap()
@@ -75,7 +91,5 @@ pub fn small_study() -> LanePlan {
 
 /// The same with other options.
 pub fn small_study_of(options: StudyOptions) -> LanePlan {
-    let generator = GeneratorOptions { recordings: 2, ..GeneratorOptions::default() };
-    let collection = mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap();
-    plan_study(&collection.scenarios, &Profile::load("paper").unwrap(), &options).unwrap()
+    plan_study(scenarios_of(2), &Profile::load("paper").unwrap(), &options).unwrap()
 }

@@ -1,6 +1,7 @@
 //! Scenarios of the generator, and densities over them.
 
-use std::sync::OnceLock;
+use std::collections::BTreeMap;
+use std::sync::Mutex;
 
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, DataProvenance, Scenario};
@@ -14,10 +15,20 @@ pub fn mined(recordings: usize) -> Collection {
     mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap()
 }
 
-/// The scenarios of the default study.
+/// The scenarios of the first recordings, mined once.
+pub fn scenarios_of(recordings: usize) -> &'static [Scenario] {
+    static MINED: Mutex<BTreeMap<usize, &'static [Scenario]>> = Mutex::new(BTreeMap::new());
+    MINED.lock().unwrap().entry(recordings).or_insert_with(|| mined(recordings).scenarios.leak())
+}
+
+/// Those of the default study.
 pub fn scenarios() -> &'static [Scenario] {
-    static MINED: OnceLock<Vec<Scenario>> = OnceLock::new();
-    MINED.get_or_init(|| mined(24).scenarios)
+    scenarios_of(24)
+}
+
+/// The kept scenarios of a category.
+pub fn kept(scenarios: &[Scenario], category: Category) -> Vec<&Scenario> {
+    scenarios.iter().filter(|s| s.kept && s.category == category).collect()
 }
 
 /// Where they come from.

@@ -3,8 +3,8 @@
 
 use std::sync::Arc;
 
-use lanesweep::engine::{Block, CaseSource, Chunk, EndReason, Headway, LaneCase, LanePlan, NO_STEP, Outcome, Verdicts};
-use lanesweep::model::criterion::{Contact, Criterion};
+use lanesweep::engine::{Block, CaseSource, Chunk, Headway, LaneCase, LanePlan, LaneRunner, Outcome, Verdicts};
+use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::scenario::{Case, Category, Lateral, Participant, Speed, Tables};
@@ -20,37 +20,28 @@ impl CaseSource for OneCase {
     }
 }
 
+/// An ego and a vehicle as fast, with so much from one middle to the other across.
+pub fn beside(y_m: f64) -> Case {
+    let lateral = Lateral::Kinematic { start_m: y_m, rate_mps: 0.0, end_m: y_m };
+    let principal = Participant { length_m: 4.0, width_m: 2.0, speed: Speed::constant(20.0), lateral };
+    let (category, ego_speed_mps, horizon_s) = (Category::Lvd, 20.0, 0.0);
+    let (ego_length_m, ego_width_m, lane_width_m) = (4.0, 2.0, 3.5);
+    Case { category, ego_length_m, ego_width_m, lane_width_m, ego_speed_mps, principal, ahead: None, horizon_s }
+}
+
+/// A block of units, with S and these variants.
+pub fn block(category: Category, units: usize, variants: &[&str]) -> Block {
+    let units = (0..units).map(|k| format!("{}_{k}", category.key())).collect();
+    let variants = std::iter::once("S").chain(variants.iter().copied()).map(str::to_owned).collect();
+    Block { category, units, variants, first_unit: 0, first_lane: 0 }
+}
+
 /// A plan of these (category, number of units, variants after S), all models, ten headways.
 pub fn plan(blocks: &[(Category, usize, &[&str])]) -> LanePlan {
     let profile = Profile::load("paper").unwrap();
-    let vehicle = Participant {
-        length_m: 4.5,
-        width_m: 1.8,
-        speed: Speed::Sampled(vec![20.0]),
-        lateral: Lateral::Sampled { position_m: vec![0.0], towards_mps: vec![0.0] },
-    };
-    let case = Case {
-        category: Category::Lvd,
-        ego_length_m: 4.5,
-        ego_width_m: 1.8,
-        lane_width_m: 3.5,
-        ego_speed_mps: 25.0,
-        principal: vehicle,
-        ahead: None,
-        horizon_s: 1.0,
-    };
     let mut tables = Tables::default();
-    let case = LaneCase::encode(&case, &profile, &mut tables);
-    let blocks = blocks
-        .iter()
-        .map(|(category, units, variants)| Block {
-            category: *category,
-            units: (0..*units).map(|k| format!("{}_{k}", category.key())).collect(),
-            variants: std::iter::once("S").chain(variants.iter().copied()).map(str::to_owned).collect(),
-            first_unit: 0,
-            first_lane: 0,
-        })
-        .collect();
+    let case = LaneCase::encode(&beside(0.0), &profile, &mut tables);
+    let blocks = blocks.iter().map(|(category, units, variants)| block(*category, *units, variants)).collect();
     LanePlan::new(profile, ModelId::ALL.to_vec(), Headway::paper(), blocks, Arc::new(OneCase(case, tables))).unwrap()
 }
 
@@ -68,24 +59,9 @@ pub fn chunk(
 ) -> Chunk {
     let (first_lane, end) = (plan.first_lane_of(units.start), plan.first_lane_of(units.end));
     let lanes: Vec<(Verdicts, f64)> = (first_lane..end).map(lane).collect();
-    let outcome = |(verdicts, min_ttc): &(Verdicts, f64)| Outcome {
-        verdicts: *verdicts,
-        contact: Contact::None,
-        contact_with: 0,
-        end: EndReason::Settled,
-        reaction_step: NO_STEP,
-        contact_step: NO_STEP,
-        end_step: 25,
-        impact_speed: 0.0,
-        impact_closing_speed: 0.0,
-        min_ttc: *min_ttc,
-        max_btn: 0.1,
-        min_gap: 1.0,
-        min_thw: 0.5,
-        max_drac: 1.0,
-        tet_steps: 2,
-        tit: 0.1,
-        pet: None,
+    let outcome = |(verdicts, min_ttc): &(Verdicts, f64)| {
+        let of_any = LaneRunner::<f64>::new(plan).run(&plan.key(first_lane).unwrap());
+        Outcome { verdicts: *verdicts, min_ttc: *min_ttc, ..of_any }
     };
     Chunk {
         units,

@@ -190,6 +190,11 @@ pub fn refused(dir: &Path, line: &str, code: i32, hint: &str) {
     assert!(found == code && out.is_empty() && err.contains(hint), "{line}: {found}, expected `{hint}`: {err}");
 }
 
+/// The rows of a CSV table by the names of its columns.
+pub fn table(path: &Path) -> Vec<BTreeMap<String, String>> {
+    csv::Reader::from_path(path).unwrap().deserialize().map(Result::unwrap).collect()
+}
+
 /// A document that a run left.
 pub fn json(path: &Path) -> serde_json::Value {
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()

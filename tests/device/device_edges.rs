@@ -136,8 +136,8 @@ fn sessions_of_one_device_do_not_disturb_one_another() {
 #[test]
 fn after_a_job_without_memory_nothing_wrong_is_computed() {
     let plan = random(4000, 157, &ModelId::ALL);
-    let expected =
-        CpuBackend::lane_arithmetic().prepare(&plan).unwrap().run(0..plan.unit_count(), Wanted::Verdicts).unwrap();
+    let cpu = CpuBackend::lane_arithmetic();
+    let expected = cpu.prepare(&plan).unwrap().run(0..plan.unit_count(), Wanted::Verdicts).unwrap();
     for at_job in [0, 1, 2] {
         let options = GpuOptions { first_lanes: 1000, ..Default::default() };
         let Some(gpu) = tampered(options, out_of_memory_at(at_job)) else { return };

@@ -1,34 +1,8 @@
 //! Shards that ran on different backends, in any order, join to the run in one piece, byte for byte. Seven shards by
 //! default; the long form is `cargo test --release --test device mixed_shards:: -- --ignored` (1, 7 and 100 of each run).
 
-use crate::common;
-
-use std::path::Path;
-
 use crate::common::device::software_device;
-use crate::common::program::ran;
-
-/// The results in a folder; of the records only that they are there (they hold times and devices), of the page all but that.
-fn results(dir: &Path) -> Vec<(String, Vec<u8>)> {
-    let paths = std::fs::read_dir(dir).unwrap().map(|entry| entry.unwrap().path());
-    let mut files: Vec<(String, Vec<u8>)> = paths
-        .map(|path| (path.file_name().unwrap().to_string_lossy().into_owned(), std::fs::read(&path).unwrap()))
-        .filter(|(name, _)| {
-            !name.ends_with("plan.json") && !name.starts_with("part-") && name != "lanesweep-files.json"
-        })
-        .collect();
-    for (name, content) in &mut files {
-        if ["run.json", "estimate.json"].contains(&name.as_str()) {
-            content.clear();
-        }
-        if name == "report.html" {
-            let page = String::from_utf8(std::mem::take(content)).unwrap();
-            *content = common::page::without_host(&page).into_bytes();
-        }
-    }
-    files.sort();
-    files
-}
+use crate::common::program::{files, ran, same, without_host};
 
 /// Every run that can be split, in one piece and in so many shards, of which every other one is the device's.
 fn whole_and_shards(counts: &[u64]) {
@@ -54,12 +28,8 @@ fn whole_and_shards(counts: &[u64]) {
                 ran(dir, &format!("-q {verb} {part} --backend {backend}"));
             }
             assert_eq!(ran(dir, &format!("-q merge {out}")), whole, "{out}");
-            let (merged, expected) = (results(&dir.join(&out)), results(&dir.join(name)));
-            let names = |files: &[(String, Vec<u8>)]| files.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
-            assert_eq!(names(&merged), names(&expected), "{out}");
-            for ((file, one), (_, other)) in merged.iter().zip(&expected) {
-                assert!(one == other, "{out}/{file} differs");
-            }
+            let [merged, expected] = [&*out, name].map(|folder| without_host(files(&dir.join(folder))));
+            same(&merged, &expected, &out);
         }
     }
 }

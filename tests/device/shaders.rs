@@ -113,24 +113,13 @@ fn generator_constants() -> Vec<(&'static str, f64)> {
     let (module, _) = parse(&shader::assemble_generator());
     let names = module.overrides.iter().map(|(_, o)| o.name.clone().unwrap());
     let recipe = Recipe { dimensions: 1, step_cap: 100, inverse_dt: 25.0, ..bytemuck::Zeroable::zeroed() };
+    let (source, dimensions, weights) = (generated::PointSource::Given, 1, None);
     let (means, factor_of, factors) = (vec![1.0], vec![0], vec![1.0]);
-    let points = generated::Points {
-        source: generated::PointSource::Given,
-        dimensions: 1,
-        weights: None,
-        means,
-        factor_of,
-        factors,
-    };
+    let points = generated::Points { source, dimensions, weights, means, factor_of, factors };
     let generator = generated::Generator { points, recipe, basis: Vec::new() };
     let given = generator.shader_constants();
     assert_eq!(names.collect::<BTreeSet<_>>(), given.iter().map(|(name, _)| (*name).to_owned()).collect());
     given
-}
-
-/// The bits of a number of the sine's polynomial in lane arithmetic.
-fn sine(at: usize) -> u32 {
-    (generated::SINE[at] as f32).to_bits()
 }
 
 fn specialization(paired: bool) -> Specialization {
@@ -160,25 +149,25 @@ fn every_pipeline_parses_validates_and_becomes_spirv_under_every_profile() {
 fn every_record_has_the_layout_of_its_rust_twin() {
     for model in ModelId::ALL {
         let (module, _) = parse(&shader::assemble(model));
-        for (name, size, ours) in records() {
-            let (stride, theirs) = fields(&module, name);
-            assert_eq!(stride, size, "{name}: size");
-            for (our, their) in ours.iter().zip(&theirs) {
-                assert_eq!(our, their, "{name}");
-            }
-            assert_eq!(ours.len(), theirs.len(), "{name}: number of fields");
-        }
+        same_records(&module, records());
     }
+}
+
+fn same_records(module: &naga::Module, records: impl IntoIterator<Item = Record>) {
+    for (name, size, ours) in records {
+        assert_eq!(fields(module, name), (size, ours), "{name}");
+    }
+}
+
+fn same_constants(module: &naga::Module, constants: &[(&str, u32)]) {
+    constants.iter().for_each(|(name, value)| assert_eq!(constant(module, name), *value, "{name}"));
 }
 
 #[test]
 fn the_generator_has_the_records_the_numbers_and_the_arithmetic_of_its_rust_twins() {
     let (module, info) = parse(&shader::assemble_generator());
-    for (name, size, ours) in records().into_iter().take(3).chain(generator_records()) {
-        let (stride, theirs) = fields(&module, name);
-        assert_eq!((stride, ours), (size, theirs), "{name}");
-    }
-    for (name, value) in [
+    same_records(&module, records().into_iter().take(3).chain(generator_records()));
+    let constants = [
         ("MAX_PARAMETERS", MAX_PARAMETERS as u32),
         ("MAX_BOUNDS", MAX_BOUNDS as u32),
         ("ATTEMPTS", ATTEMPTS),
@@ -201,9 +190,8 @@ fn the_generator_has_the_records_the_numbers_and_the_arithmetic_of_its_rust_twin
         ("LATERAL_LEAVING", generated::LateralPath::Leaving as u32),
         ("LATERAL_GONE", generated::LateralPath::Gone as u32),
         ("NEVER", NEVER),
-    ] {
-        assert_eq!(constant(&module, name), value, "{name}");
-    }
+    ];
+    same_constants(&module, &constants);
     let found = float_operations(&module, &info);
     assert_eq!((found.forbidden, found.divided_in), (Vec::<String>::new(), vec!["exact_div".to_owned()]));
     let words = exact_spirv(&shader::assemble_generator(), shader::GENERATE, &generator_constants(), false);
@@ -218,10 +206,8 @@ fn the_counting_has_the_records_and_the_places_of_its_rust_twins() {
         record!("DrawnRecord", DrawnRecord, { tries: u32, component: u32 }),
         record!("Tally", Tally, { samples: u32, first_drawn: u32, words: u32 }),
     ];
-    for (name, size, ours) in records {
-        assert_eq!(fields(&module, name), (size, ours), "{name}");
-    }
-    for (name, value) in [
+    same_records(&module, records);
+    let constants = [
         ("ATTEMPTS", ATTEMPTS),
         ("CRITERIA", Criterion::ALL.len() as u32),
         ("LANES_PER_WORD", u32::BITS / 4),
@@ -230,9 +216,8 @@ fn the_counting_has_the_records_and_the_places_of_its_rust_twins() {
         ("TRIES", CountLayout::TRIES as u32),
         ("GATHERED", CountLayout::GATHERED as u32),
         ("WORKGROUP", shader::WORKGROUP),
-    ] {
-        assert_eq!(constant(&module, name), value, "{name}");
-    }
+    ];
+    same_constants(&module, &constants);
     let found = float_operations(&module, &info);
     assert_eq!((found.forbidden, found.divided_in), (vec![], vec![]));
     assert_eq!(unbounded_loops(&module), (3, vec![]));
@@ -250,12 +235,9 @@ fn every_table_has_the_stride_of_its_rust_twin() {
             ref other => panic!("{name}: {other:?}"),
         }
     };
-    assert_eq!(stride("cases"), size_of::<LaneCase<f32>>());
-    assert_eq!(stride("starts"), size_of::<StartRecord>());
-    assert_eq!(stride("speed_table"), size_of::<f32>());
-    assert_eq!(stride("lateral_table"), size_of::<[f32; 2]>());
-    assert_eq!(stride("verdicts"), size_of::<u32>());
-    assert_eq!(stride("outcomes"), size_of::<OutcomeRecord>());
+    let (cases, outcomes) = (size_of::<LaneCase<f32>>(), size_of::<OutcomeRecord>());
+    assert_eq!(["cases", "starts", "outcomes"].map(stride), [cases, size_of::<StartRecord>(), outcomes]);
+    assert_eq!(["speed_table", "lateral_table", "verdicts"].map(stride), [4, 8, 4]);
 }
 
 #[test]
@@ -317,12 +299,6 @@ fn constants_that_stand_on_both_sides_agree() {
         ("ATTEMPTS", ATTEMPTS),
         ("LAST_STEPS", shader::LONGEST_BURST),
         ("BINADE", 1 << (f32::MANTISSA_DIGITS - 1)),
-        ("SINE_0", sine(0)),
-        ("SINE_1", sine(1)),
-        ("SINE_2", sine(2)),
-        ("SINE_3", sine(3)),
-        ("SINE_4", sine(4)),
-        ("SINE_5", sine(5)),
         ("NO_STEP", NO_STEP),
         ("GATE_EGO_WIDTH", LateralGate::EgoWidth as u32),
         ("GATE_OVERLAP", LateralGate::Overlap as u32),
@@ -342,9 +318,12 @@ fn constants_that_stand_on_both_sides_agree() {
         // Four verdict bits a lane.
         ("LANES_PER_WORD", u32::BITS / 4),
     ];
-    for (name, host) in expected {
-        assert_eq!(constant(&module, name), host, "{name}");
-    }
+    // Numbers of the sine's polynomial in lane arithmetic.
+    let sines = ["SINE_0", "SINE_1", "SINE_2", "SINE_3", "SINE_4", "SINE_5"];
+    let bits = |at: usize| (generated::SINE[at] as f32).to_bits();
+    let expected: Vec<(&str, u32)> =
+        expected.into_iter().chain(sines.into_iter().enumerate().map(|(at, name)| (name, bits(at)))).collect();
+    same_constants(&module, &expected);
     // A lane that is not over never writes its end: no reason may have its code.
     assert!(expected.iter().all(|(name, code)| !name.starts_with("END_") || *code != constant(&module, "END_NOT_YET")));
     // No constant without a twin is added unseen.
@@ -362,22 +341,10 @@ fn the_host_reads_from_an_outcome_word_what_a_lane_writes_into_it() {
     let criteria: Criteria<f32> = Profile::load("paper").unwrap().criteria.resolve();
     let read = |word: u32| {
         let unbounded = f32::INFINITY.to_bits();
-        let record = OutcomeRecord {
-            word,
-            reaction_step: NO_STEP,
-            end_step: 7,
-            impact_speed: 0.0,
-            impact_closing_speed: 0.0,
-            min_ttc_bits: unbounded,
-            btn_numerator: 0.0,
-            btn_denominator: 1.0,
-            min_gap_bits: unbounded,
-            min_thw_bits: unbounded,
-            max_drac_bits: 0,
-            tet_steps: 0,
-            tit: 0.0,
-            pet_bits: NO_STEP,
-        };
+        let mut record: OutcomeRecord = bytemuck::Zeroable::zeroed();
+        (record.word, record.btn_denominator, record.pet_bits) = (word, 1.0, NO_STEP);
+        (record.reaction_step, record.end_step) = (NO_STEP, 7);
+        (record.min_ttc_bits, record.min_gap_bits, record.min_thw_bits) = (unbounded, unbounded, unbounded);
         record.outcome(&criteria)
     };
     let settled = constant(&module, "END_SETTLED") << 8;
@@ -422,6 +389,15 @@ fn in_crate(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
 }
 
+/// Functions of the Rust file beside a shader, but for those without a twin.
+fn twin_functions(folder: &str, shader: &str, no_twin: &[&str]) -> Vec<String> {
+    let twin = in_crate(folder).join(shader).with_extension("rs");
+    let text = std::fs::read_to_string(&twin).unwrap_or_else(|e| panic!("{}: {e}", twin.display()));
+    let mut names = function_names(text.split("#[cfg(test)]").next().unwrap());
+    names.retain(|name| !no_twin.contains(&name.as_str()));
+    names
+}
+
 #[test]
 fn every_model_has_a_shader_with_the_functions_of_its_rust_file_in_their_order() {
     // What only the host does, or batches of lanes alone; and `shader_constants` is what joins the two.
@@ -430,18 +406,12 @@ fn every_model_has_a_shader_with_the_functions_of_its_rust_file_in_their_order()
     let no_twin: Vec<&str> = no_twin.split(' ').collect();
     for model in ModelId::ALL {
         let (file, shader) = driver_shader(model);
-        let twin = in_crate("src/model/driver").join(file).with_extension("rs");
-        let text = std::fs::read_to_string(&twin).unwrap_or_else(|e| panic!("{}: {e}", twin.display()));
-        let mut names = function_names(text.split("#[cfg(test)]").next().unwrap());
-        names.retain(|name| !no_twin.contains(&name.as_str()));
+        let names = twin_functions("src/model/driver", file, &no_twin);
         // The demand of a view is part of the twin's `check`; promises are made where they pay.
         let mut in_wgsl = function_names(shader);
         in_wgsl.retain(|name| !["demand", "safe_gap", "ignores"].contains(&name.as_str()));
         assert_eq!(names, in_wgsl, "{file} and its twin");
-        assert!(
-            ["initial", "check", "react"].iter().all(|&required| names.iter().any(|name| name == required)),
-            "{file}"
-        );
+        assert!(["initial", "check", "react"].iter().all(|required| names.contains(&(*required).to_owned())), "{file}");
     }
 }
 
@@ -453,11 +423,8 @@ fn the_fragments_of_sampling_have_the_functions_of_their_rust_files_in_their_ord
     // Methods have the name of their type with them in WGSL.
     let renamed = [("words", "stream_words"), ("pick", "alias_pick")];
     for (file, shader) in RANDOM {
-        let name = Path::new(file).file_name().unwrap();
-        let twin = in_crate("src/random").join(name).with_extension("rs");
-        let text = std::fs::read_to_string(&twin).unwrap_or_else(|e| panic!("{}: {e}", twin.display()));
-        let mut names = function_names(text.split("#[cfg(test)]").next().unwrap());
-        names.retain(|name| !no_twin.contains(&name.as_str()));
+        let name = Path::new(file).file_name().unwrap().to_str().unwrap();
+        let mut names = twin_functions("src/random", name, &no_twin);
         for name in &mut names {
             if let Some((_, in_wgsl)) = renamed.iter().find(|(in_rust, _)| in_rust == name) {
                 *name = (*in_wgsl).to_owned();
@@ -482,10 +449,14 @@ fn the_fragments_of_sampling_do_only_what_devices_agree_on() {
     assert_eq!(constant(&module, "SOBOL_ROW") as usize, SOBOL_ROW);
 }
 
+/// Names and texts of the files that pipelines are made of.
+fn shader_files() -> impl Iterator<Item = (&'static str, &'static str)> {
+    SHARED.into_iter().chain(RANDOM).chain(GENERATOR).chain(TALLY).chain(ModelId::ALL.map(driver_shader))
+}
+
 #[test]
 fn every_shader_file_is_part_of_a_pipeline() {
-    let parts = SHARED.into_iter().chain(RANDOM).chain(GENERATOR).chain(TALLY).chain(ModelId::ALL.map(driver_shader));
-    let known: BTreeSet<String> = parts.map(|(name, _)| name.to_owned()).collect();
+    let known: BTreeSet<String> = shader_files().map(|(name, _)| name.to_owned()).collect();
     let mut found = BTreeSet::new();
     for folder in ["", "shared/"] {
         for entry in std::fs::read_dir(in_crate("shaders").join(folder)).unwrap() {
@@ -498,9 +469,7 @@ fn every_shader_file_is_part_of_a_pipeline() {
 
 #[test]
 fn only_the_entry_has_bindings_and_every_file_stays_short_and_plain() {
-    for (name, text) in
-        SHARED.into_iter().chain(RANDOM).chain(GENERATOR).chain(TALLY).chain(ModelId::ALL.map(driver_shader))
-    {
+    for (name, text) in shader_files() {
         assert!(text.lines().count() <= 600, "{name} is longer than 600 lines");
         assert_eq!(uninitialized_in_loops(text), Vec::<String>::new(), "{name}");
         let code = without_comments(text);
@@ -509,10 +478,9 @@ fn only_the_entry_has_bindings_and_every_file_stays_short_and_plain() {
                 assert!(!code.contains(word), "{name} has {word}");
             }
         }
-        for call in ["fma", "exp", "exp2", "log", "log2", "pow", "sin", "cos", "tan", "sqrt", "inverseSqrt"]
-            .into_iter()
-            .chain(["min", "max", "clamp", "mix", "fract", "modf", "dot", "length", "normalize"])
-        {
+        let calls =
+            "fma exp exp2 log log2 pow sin cos tan sqrt inverseSqrt min max clamp mix fract modf dot length normalize";
+        for call in calls.split(' ') {
             let is_called = code.match_indices(&format!("{call}(")).any(|(at, _)| {
                 let before = code[..at].chars().next_back();
                 !before.is_some_and(|c| c.is_ascii_alphanumeric() || c == '_')

@@ -66,6 +66,9 @@ fn rows(path: &Path) -> Vec<Row> {
     read.map(|(at, cells)| Row { cells: cells.unwrap(), place: format!("{}:{}", path.display(), at + 2) }).collect()
 }
 
+/// The outcome of a lane, its steps, and the minima of TTC and gap.
+type Ran = (Outcome<f64>, Vec<Step<f64>>, [f64; 2]);
+
 /// One row of the JRC's case tables as a lane.
 struct Replay {
     model: ModelId,
@@ -103,7 +106,7 @@ impl Replay {
     }
 
     /// The outcome, every step, and the minima of TTC and gap as the tables have them.
-    fn run(&self) -> (Outcome<f64>, Vec<Step<f64>>, [f64; 2]) {
+    fn run(&self) -> Ran {
         let (mut tables, mut steps) = (Tables::default(), Vec::new());
         let lane = LaneCase::encode(&self.case, &self.profile, &mut tables);
         let constants = Constants::<f64>::resolve(&self.profile, self.case.category);
@@ -144,13 +147,7 @@ fn time(step: u32, dt: f64) -> Option<f64> {
 }
 
 /// Differences of one lane from its row of a JRC case table.
-fn case_differences(
-    row: &Row,
-    replay: &Replay,
-    ours: &Outcome<f64>,
-    steps: &[Step<f64>],
-    minima: [f64; 2],
-) -> Vec<String> {
+fn case_differences(row: &Row, replay: &Replay, (ours, steps, minima): &Ran) -> Vec<String> {
     let dt = replay.profile.frame.dt_s;
     let collided = ours.end == EndReason::Contact;
     let label = row.difference("collision", Some(f64::from(u8::from(collided))), 1.0);
@@ -167,13 +164,8 @@ fn case_differences(
         ("min_ttc", Some(minima[0])),
         ("min_gap", Some(minima[1])),
     ];
-    let mut x = (1.0 - f64::from(replay.run_up)) * replay.case.ego_speed_mps * dt;
-    let positions: Vec<f64> = std::iter::once(x)
-        .chain(steps.iter().skip(1).map(|step| {
-            x += step.v_ego * dt;
-            x
-        }))
-        .collect();
+    let mut positions = vec![(1.0 - f64::from(replay.run_up)) * replay.case.ego_speed_mps * dt];
+    steps.iter().skip(1).for_each(|step| positions.push(positions[positions.len() - 1] + step.v_ego * dt));
     // Columns such as `v@2.5` and `x@3`: speed and position at an instant, blank after the lane's end.
     for column in row.cells.keys() {
         if let Some((quantity, at)) = column.split_once('@') {
@@ -193,16 +185,12 @@ fn jrc_differences(rows: &[Row], asked: bool) -> Vec<String> {
     let mut differences = Vec::new();
     for row in rows {
         let replay = Replay::of(row, &profile);
-        let (outcome, steps, minima) = replay.run();
-        differences.extend(case_differences(row, &replay, &outcome, &steps, minima));
+        let ran = replay.run();
+        differences.extend(case_differences(row, &replay, &ran));
         let kind = (row.cells.get("variant").or(row.cells.get("check")), replay.model);
         all.insert(kind);
-        if outcome.reaction_step != NO_STEP {
-            reacted.insert(kind);
-        }
-        if outcome.end == EndReason::Contact {
-            collided.insert(kind);
-        }
+        reacted.extend((ran.0.reaction_step != NO_STEP).then_some(kind));
+        collided.extend((ran.0.end == EndReason::Contact).then_some(kind));
     }
     assert!(!asked || (reacted == all && collided == all), "{all:?} {reacted:?} {collided:?}");
     differences

@@ -9,17 +9,14 @@ use lanesweep::model::profile::Profile;
 use lanesweep::model::scalar::Real;
 use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions, TimeGrid, recorded_case};
-use lanesweep::scenario::{Ahead, Case, Category, Ego, Lateral, Other, Participant, Scenario, Side, Speed, Tables};
+use lanesweep::scenario::{Ahead, Case, Category, Lateral, Participant, Scenario, Speed, Tables};
+use serde_json::json;
 
-use crate::common::lane_sets::{forms, random, thresholds};
+use crate::common::lane_sets::{forms, random, run_case, thresholds};
 use crate::counting::Counting;
 
 fn run_in<R: Real>(profile: &Profile, case: &Case, model: ModelId, thw: f64) -> Outcome<f64> {
-    let mut tables = Tables::default();
-    let lane = LaneCase::encode(case, profile, &mut tables);
-    let constants = Constants::<R>::resolve(profile, case.category);
-    let start = Start::Headway(R::from_f64(thw));
-    constants.run(model, &lane.cast(), &tables.cast(), start, &mut Silent).widen()
+    run_case(profile, case, model, Start::Headway(R::from_f64(thw)), &mut Silent)
 }
 
 fn run(profile: &Profile, case: &Case, model: ModelId, thw: f64) -> Outcome<f64> {
@@ -61,12 +58,9 @@ fn cut_out(speed: f64, lateral_speed: f64, gap_m: f64) -> Case {
 
 /// LVDs over a grid of speeds and decelerations.
 fn lvd_grid() -> impl Iterator<Item = Case> {
-    let speeds = [8.0, 14.0, 20.0, 27.0, 33.0];
-    speeds.into_iter().flat_map(|v0| {
-        [0.0, 0.3, 0.6, 0.85]
-            .into_iter()
-            .flat_map(move |share| [0.5, 1.5, 3.0, 5.0, 8.0].into_iter().map(move |a| lvd(v0, v0 * share, a)))
-    })
+    let speeds = [8.0, 14.0, 20.0, 27.0, 33.0].into_iter();
+    let ends = speeds.flat_map(|v0| [0.0, 0.3, 0.6, 0.85].map(|share| (v0, v0 * share)));
+    ends.flat_map(|(v0, v1)| [0.5, 1.5, 3.0, 5.0, 8.0].map(|a| lvd(v0, v1, a)))
 }
 
 fn headways() -> impl Iterator<Item = f64> {
@@ -79,9 +73,8 @@ fn a_mirrored_cut_in_gives_the_same_outcome_to_the_last_bit() {
     let towards: Vec<f64> = (0..120).map(|i| 0.75 - 0.004 * f64::from(i)).collect();
     let mirrored: Vec<f64> = y.iter().map(|y| -y).collect();
     for v_other in [15.0, 22.0, 27.0] {
-        let left = cut_in(30.0, v_other, Lateral::Sampled { position_m: y.clone(), towards_mps: towards.clone() });
-        let right =
-            cut_in(30.0, v_other, Lateral::Sampled { position_m: mirrored.clone(), towards_mps: towards.clone() });
+        let [left, right] = [&y, &mirrored]
+            .map(|y| cut_in(30.0, v_other, Lateral::Sampled { position_m: y.clone(), towards_mps: towards.clone() }));
         for model in ModelId::ALL {
             for thw in headways() {
                 assert_eq!(run(&paper(), &left, model, thw), run(&paper(), &right, model, thw));
@@ -93,16 +86,13 @@ fn a_mirrored_cut_in_gives_the_same_outcome_to_the_last_bit() {
 
 /// States of the ego, step by step.
 fn course(profile: &Profile, case: &Case, model: ModelId, thw_s: f64) -> Vec<[u64; 2]> {
-    let mut tables = Tables::default();
-    let lane = LaneCase::encode(case, profile, &mut tables);
-    let constants = Constants::<f64>::resolve(profile, case.category);
     let mut states = Vec::new();
     let mut see = |step: &Step<f64>| {
         let first = step.seen[0];
         let gap_m = if first.present.holds() { first.view.gap } else { 0.0 };
         states.push([step.v_ego.to_bits(), gap_m.to_bits()]);
     };
-    constants.run(model, &lane, &tables, Start::Headway(thw_s), &mut see);
+    run_case(profile, case, model, Start::Headway(thw_s), &mut see);
     states
 }
 
@@ -131,8 +121,8 @@ fn what_happens_after_a_step_decides_nothing_before_it() {
         for split_s in [0.3, 0.9, 2.2] {
             let split = steps(split_s);
             for (first, [a, b]) in [(0.0, [6.0, 0.0]), (4.0, [8.0, 0.0]), (4.0, [4.0, 8.0]), (6.0, [0.0, 6.0])] {
-                let lead =
-                    |then| case(Category::Lvd, 22.0, vehicle(speed(22.0, first, then, split), Lateral::Centred), 22.0);
+                let brakes = |then| vehicle(speed(22.0, first, then, split), Lateral::Centred);
+                let lead = |then| case(Category::Lvd, 22.0, brakes(then), 22.0);
                 let enters = |then_mps: f64| lateral(3.5, -0.9, then_mps, split);
                 let cutter = |then| {
                     let mut case = cut_in(22.0, 18.0, enters(-0.9));
@@ -145,8 +135,8 @@ fn what_happens_after_a_step_decides_nothing_before_it() {
                     case.principal.lateral = lateral(0.01, 0.9, then / 4.0, split);
                     case
                 };
-                let pairs: [[Case; 2]; 4] =
-                    [[a, b].map(lead), [a, b].map(cutter), [a, b].map(turns), [a, b].map(leaver)];
+                let both = [a, b];
+                let pairs: [[Case; 2]; 4] = [both.map(lead), both.map(cutter), both.map(turns), both.map(leaver)];
                 for ([one, other], model) in pairs.iter().flat_map(|pair| ModelId::ALL.map(|model| (pair, model))) {
                     for thw_s in [0.5, 1.0, 1.8] {
                         let [one_course, other_course] = [one, other].map(|case| course(&profile, case, model, thw_s));
@@ -218,36 +208,15 @@ fn a_longer_headway_can_turn_an_lvd_pass_into_a_ttc_failure() {
 
 /// A scenario whose recorded motion already has the parameterized form.
 fn scenario(category: Category, v: Vec<f64>, y: Vec<f64>, lead: Option<Vec<f64>>) -> Scenario {
-    let other = |v: Vec<f64>, y: Vec<f64>| Other { length: 4.5, width: 1.9, v, y };
-    let n = v.len();
-    Scenario {
-        id: "made".into(),
-        category,
-        recording: String::new(),
-        ego_id: 0,
-        target_id: 1,
-        lead_id: None,
-        frame0: 0,
-        frame1: n as i64 - 1,
-        fps: 25.0,
-        kept: true,
-        reason: String::new(),
-        ego: Ego { v0: 30.0, length: 4.7, width: 1.9 },
-        lane_width: 3.5,
-        side: Side::Left,
-        target: other(v, y),
-        lead: lead.map(|v| other(v, vec![0.0; n])),
-        thw0: None,
-        gap0: None,
-        lead_gap: Some(22.0),
-        peak_decel: None,
-        truncated_start: None,
-        end_cause: None,
-        frame_switch: None,
-        tag_frames: None,
-        synthetic: false,
-        replays: Vec::new(),
-    }
+    let frame1 = v.len() - 1;
+    let other = |v: Vec<f64>, y: Vec<f64>| json!({ "length": 4.5, "width": 1.9, "v": v, "y": y });
+    let lead = lead.map(|v| other(v, vec![0.0; frame1 + 1]));
+    let ego = json!({ "v0": 30.0, "length": 4.7, "width": 1.9 });
+    let made = json!({
+        "id": "made", "category": category, "frame1": frame1, "fps": 25.0, "side": "left", "ego": ego,
+        "target": other(v, y), "lead": lead, "D": 22.0,
+    });
+    serde_json::from_value(made).unwrap()
 }
 
 /// A planned study keeps what decides a lane: S is the recorded case in its own lane, wide or narrow.
@@ -288,8 +257,8 @@ fn s_prime_equals_s_when_the_recorded_motion_has_the_parameterized_form() {
     let braking: Vec<f64> = (0..n).map(|i| 24.0 - 1.5 * t(i)).collect();
     let incoming: Vec<f64> = (0..n).map(|i| 3.5 * (1.0 - t(i) / duration)).collect();
     let outgoing: Vec<f64> = (0..n).map(|i| 3.5 * t(i) / duration).collect();
-    let cosine: Vec<f64> =
-        (0..n).map(|i| 24.0 - 4.0 * (1.0 - (std::f64::consts::PI * t(i) / duration).cos())).collect();
+    let phase = |i: usize| std::f64::consts::PI * t(i) / duration;
+    let cosine: Vec<f64> = (0..n).map(|i| 24.0 - 4.0 * (1.0 - phase(i).cos())).collect();
     let centred = vec![0.0; n];
     let pairs = [
         ("1", scenario(Category::CutIn, constant.clone(), incoming.clone(), None)),
@@ -413,15 +382,12 @@ fn the_ego_never_accelerates_and_never_drives_backwards() {
     let profile = paper();
     for case in lvd_grid() {
         for model in ModelId::ALL {
-            let mut tables = Tables::default();
-            let lane = LaneCase::encode(&case, &profile, &mut tables);
-            let constants = Constants::<f64>::resolve(&profile, case.category);
             let mut before = f64::INFINITY;
-            let mut check = |step: &lanesweep::engine::Step<f64>| {
+            let mut check = |step: &Step<f64>| {
                 assert!(step.v_ego <= before && step.v_ego >= 0.0);
                 before = step.v_ego;
             };
-            constants.run(model, &lane, &tables, Start::Headway(0.8), &mut check);
+            run_case(&profile, &case, model, Start::Headway(0.8), &mut check);
         }
     }
 }
@@ -433,9 +399,6 @@ fn where_f32_and_f64_differ_a_tenth_of_a_millimetre_decides() {
     let profile = paper();
     let (mut different, mut lanes) = (0, 0);
     for case in lvd_grid() {
-        let mut tables = Tables::default();
-        let lane = LaneCase::encode(&case, &profile, &mut tables);
-        let constants = Constants::<f64>::resolve(&profile, case.category);
         for model in ModelId::ALL {
             for thw in headways() {
                 lanes += 1;
@@ -448,7 +411,7 @@ fn where_f32_and_f64_differ_a_tenth_of_a_millimetre_decides() {
                 different += 1;
                 let nudged = |by: f64| {
                     let start = Start::Gap(thw * case.ego_speed_mps + by);
-                    judged(constants.run(model, &lane, &tables, start, &mut Silent))
+                    judged(run_case(&profile, &case, model, start, &mut Silent))
                 };
                 let reached = [1e-4, -1e-4, 1e-5, -1e-5, 1e-6, -1e-6].iter().any(|by| nudged(*by) == narrow);
                 assert!(reached, "{model:?} {thw} s {case:?}: f32 {narrow:?}");
@@ -525,33 +488,6 @@ fn jrc_2021_un_r157_and_paper_fit_run_every_category_and_differ_from_paper_where
     }
 }
 
-/// Every difference between the two readings is a named option (docs/src/methods/profiles.md): set one by one, they turn
-/// the regulation's text into the JRC's simulator.
-#[test]
-fn named_options_alone_turn_un_r157_into_jrc_2021() {
-    let (mut profile, jrc) = (Profile::load("un-r157").unwrap(), Profile::load("jrc-2021").unwrap());
-    macro_rules! set {
-        ($($table:ident.$key:ident)+) => {
-            $(
-                assert_ne!(profile.$table.$key, jrc.$table.$key, "{}.{}", stringify!($table), stringify!($key));
-                profile.$table.$key = jrc.$table.$key.clone();
-            )+
-        };
-    }
-    set! {
-        frame.dt_s frame.time_cap_s frame.start_shift frame.end_when_settled frame.cut_out_target
-        criteria.gate
-        reg157.margin_s reg157.margin_steps reg157.visible_lateral_movement_s reg157.always_unsafe reg157.clause
-        reg157.lane_intrusion_m reg157.ttc_only_while_closing cchdm.ttc_only_while_closing
-        cchdm.lateral_gate_m cchdm.always_unsafe cchdm.wandering_m cchdm.perception_time_s cchdm.cut_out_headway_s
-        cchdm.cut_out_headway_tolerance_m cchdm.cut_in_braking
-        cchdm.lead_deceleration_trigger_mps2
-        fsm.cfs_step
-    }
-    (profile.name, profile.description) = (jrc.name.clone(), jrc.description.clone());
-    assert_eq!(profile, jrc);
-}
-
 /// Annex 3, cut-out: 0.375 m, 0.4 s of perception, a headway of at most 2.0 s, then the braking goes on to standstill.
 #[test]
 fn under_un_r157_cchdm_brakes_in_a_cut_out_by_headway_and_goes_on() {
@@ -574,10 +510,8 @@ fn under_un_r157_cchdm_brakes_in_a_cut_out_by_headway_and_goes_on() {
     assert_eq!((near.contact_step, near.end), (NO_STEP, EndReason::Standstill));
     // 0.75 s, then 0.6 s of ramp and 20 m/s at 7.59 m/s².
     let stops_s = f64::from(near.end_step) * 0.01;
-    assert!(
-        (stops_s - (0.78 + 0.75 + 0.3 + 20.0 / 7.593)).abs() < 0.15,
-        "it does not wait for the vehicle ahead: {stops_s}"
-    );
+    let waited_s = stops_s - (0.78 + 0.75 + 0.3 + 20.0 / 7.593);
+    assert!(waited_s.abs() < 0.15, "it does not wait for the vehicle ahead: {stops_s}");
 }
 
 /// Time steps from fine to the longest that the profiles allow.
@@ -585,15 +519,9 @@ const TIME_STEPS_S: [f64; 9] = [0.01, 0.04, 0.1, 0.13, 0.17, 0.2, 0.25, 0.3, 0.3
 
 /// A case at a time step from a gap, in both arithmetics: they must agree on the contact.
 fn at_time_step(dt_s: f64, case: &Case, model: ModelId, gap_m: f64) -> Outcome<f64> {
-    fn outcome<R: Real>(profile: &Profile, case: &Case, model: ModelId, gap_m: f64) -> Outcome<f64> {
-        let mut tables = Tables::default();
-        let lane = LaneCase::encode(case, profile, &mut tables);
-        let constants = Constants::<R>::resolve(profile, case.category);
-        constants.run(model, &lane.cast(), &tables.cast(), Start::Gap(R::from_f64(gap_m)), &mut Silent).widen()
-    }
     let profile = paper().with_dt(dt_s).unwrap();
-    let wide = outcome::<f64>(&profile, case, model, gap_m);
-    let narrow = outcome::<f32>(&profile, case, model, gap_m);
+    let wide = run_case(&profile, case, model, Start::Gap(gap_m), &mut Silent);
+    let narrow = run_case(&profile, case, model, Start::Gap(gap_m as f32), &mut Silent);
     assert_eq!((wide.contact, wide.verdicts), (narrow.contact, narrow.verdicts), "{dt_s} s, {case:?}, {gap_m} m");
     wide
 }
@@ -636,7 +564,6 @@ fn a_vehicle_from_behind_hits_the_ego_from_behind_at_every_time_step() {
             // Bumper to bumper behind the ego, 4.3 m long as the other.
             let gap_m = -8.6 - (v_other - v_ego) * time_s;
             let case = Case { ego_speed_mps: v_ego, horizon_s: 5.0, ..lvd(v_other, v_other, 1.0) };
-            let case = Case { horizon_s: 5.0, ..case };
             for dt_s in TIME_STEPS_S {
                 let outcome = at_time_step(dt_s, &case, ModelId::Fsm, gap_m);
                 let what = format!("{v_ego} and {v_other} m/s, {time_s} s, {dt_s} s: {outcome:?}");

@@ -1,13 +1,13 @@
 //! Values without a verdict: smallest THW, largest DRAC, TET, TIT, and the PET of a cut-in.
 
-use lanesweep::engine::{Constants, LaneCase, LaneRunner, Outcome, Silent, Start, Step};
+use lanesweep::engine::{Constants, LaneRunner, Outcome, Silent, Start, Step};
 use lanesweep::model::criterion::BtnContact;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::model::scalar::Real;
-use lanesweep::scenario::{Ahead, Case, Category, Lateral, Participant, Speed, Tables};
+use lanesweep::scenario::{Ahead, Case, Category, Lateral, Participant, Speed};
 
-use crate::common::lane_sets::random;
+use crate::common::lane_sets::{random, run_case};
 
 /// A profile whose FSM keeps its speed: its reaction time is longer than any run.
 fn unreacting(time_cap_s: f64) -> Profile {
@@ -34,11 +34,7 @@ fn cut_in(ego_mps: f64, other_mps: f64, horizon_s: f64) -> Case {
 const ENCROACHES_S: f64 = 1.68;
 
 fn run_in<R: Real>(profile: &Profile, case: &Case, model: ModelId, gap_m: f64) -> Outcome<f64> {
-    let mut tables = Tables::default();
-    let lane = LaneCase::encode(case, profile, &mut tables);
-    let constants = Constants::<R>::resolve(profile, case.category);
-    let start = Start::Gap(R::from_f64(gap_m));
-    constants.run(model, &lane.cast(), &tables.cast(), start, &mut Silent).widen()
+    run_case(profile, case, model, Start::Gap(R::from_f64(gap_m)), &mut Silent)
 }
 
 /// In binary64, and in binary32 with the same result but for rounding.
@@ -137,12 +133,9 @@ fn only_a_vehicle_that_comes_into_the_path_during_the_lane_has_a_pet() {
     let within = Lateral::Kinematic { start_m: 1.0, rate_mps: -0.5, end_m: 0.0 };
     let beside = Lateral::Kinematic { start_m: 3.5, rate_mps: -1.0, end_m: 2.0 };
     let leaves = Lateral::Kinematic { start_m: 0.0, rate_mps: 1.0, end_m: 3.5 };
-    for (category, lateral) in [
-        (Category::Lvd, Lateral::Centred),
-        (Category::CutIn, within),
-        (Category::CutIn, beside),
-        (Category::CutOut, leaves),
-    ] {
+    let (cut_in, cut_out) = (Category::CutIn, Category::CutOut);
+    let cases = [(Category::Lvd, Lateral::Centred), (cut_in, within), (cut_in, beside), (cut_out, leaves)];
+    for (category, lateral) in cases {
         let found = run(&profile, &case(category, 25.0, vehicle(20.0, lateral), 3.0), ModelId::Reg157, 40.0);
         assert_eq!(found.pet, None, "{category:?}");
     }

@@ -4,7 +4,7 @@ use crate::common::plans;
 
 use crate::common::plans::{chunk, mixed, plan};
 use lanesweep::Place;
-use lanesweep::engine::{LanePlan, Partial, Verdicts};
+use lanesweep::engine::{Chunk, LanePlan, Partial, Verdicts};
 use lanesweep::model::criterion::Criterion;
 use lanesweep::run::parts::{seal, unseal};
 use lanesweep::scenario::Category;
@@ -128,17 +128,16 @@ fn overlaps_and_strangers_are_refused() {
 fn a_chunk_that_does_not_fit_its_plan_is_an_error_and_no_panic() {
     let plan = study();
     let good = chunk(&plan, 2..6, &lane(1), true);
-    let mut short = good.clone();
-    short.verdicts.pop();
-    let mut few_values = good.clone();
-    few_values.outcomes.pop();
-    let mut shifted = good.clone();
-    shifted.first_lane += 1;
-    let mut beyond = good.clone();
-    beyond.units.end = 99;
-    let mut reversed = good.clone();
-    (reversed.units.start, reversed.units.end) = (6, 2);
-    for bad in [short, few_values, shifted, beyond, reversed] {
+    let spoils: [fn(&mut Chunk); 5] = [
+        |chunk| chunk.verdicts.truncate(chunk.verdicts.len() - 1),
+        |chunk| chunk.outcomes.truncate(chunk.outcomes.len() - 1),
+        |chunk| chunk.first_lane += 1,
+        |chunk| chunk.units.end = 99,
+        |chunk| (chunk.units.start, chunk.units.end) = (6, 2),
+    ];
+    for spoil in spoils {
+        let mut bad = good.clone();
+        spoil(&mut bad);
         let error = Partial::from_chunk(&plan, &bad).unwrap_err();
         assert!(matches!(error, lanesweep::Error::Internal(_)), "{error}");
     }

@@ -1,9 +1,7 @@
 //! Cases made where lanes run: they mean what the host's cases mean, and every backend makes the same bits of them.
 
 use crate::common;
-use crate::common::mined::{mined, provenance};
-
-use std::sync::OnceLock;
+use crate::common::mined::{fitted, provenance, scenarios_of};
 
 use lanesweep::engine::{
     Backend, CpuBackend, Executor, Headway, Instructions, LaneCase, LanePlan, Outcome, Session, Wanted, words,
@@ -17,22 +15,12 @@ use lanesweep::run::sampling::{
 };
 use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions};
-use lanesweep::scenario::{Category, Scenario, Tables};
+use lanesweep::scenario::{Category, Tables};
 use lanesweep::stats::density::{DensityModel, FitOptions};
 use lanesweep::stats::random::Stream;
 
-fn scenarios() -> &'static [Scenario] {
-    static MINED: OnceLock<Vec<Scenario>> = OnceLock::new();
-    MINED.get_or_init(|| mined(12).scenarios)
-}
-
-fn density(id: Parameterization, with_thw: bool) -> DensityModel {
-    density_with(id, FitOptions { with_thw, ..FitOptions::default() })
-}
-
-fn density_with(id: Parameterization, options: FitOptions) -> DensityModel {
-    let options = FitOptions { valid_draws: 1000, ..options };
-    DensityModel::fit(id, scenarios(), &provenance(), &options).unwrap().model
+fn density(category: Category, key: &str, with_thw: bool) -> DensityModel {
+    fitted(scenarios_of(12), category, key, with_thw)
 }
 
 fn options(samples: u64, source: SampleSource) -> SampleOptions {
@@ -54,7 +42,7 @@ fn outcomes(plan: &LanePlan, backend: &dyn Backend, cuts: &[u64]) -> Vec<[u64; 1
 fn a_case_made_for_a_lane_is_the_case_that_the_host_makes() {
     for profile in ["paper", "un-r157"].map(|name| Profile::load(name).unwrap()) {
         for id in Parameterization::ALL {
-            let density = density(id, false);
+            let density = density(id.category, id.key, false);
             let points: Vec<Vec<f64>> = density.kde.points().to_vec();
             let generator = generator_of_points(&density.space, &points, &density.sizes, &profile).unwrap();
             let mut late = 0;
@@ -99,8 +87,7 @@ fn a_case_made_for_a_lane_is_the_case_that_the_host_makes() {
 
 #[test]
 fn draws_have_the_mean_and_the_spread_of_their_mixture_and_stay_valid() {
-    let id = Parameterization::find(Category::CutIn, "2").unwrap();
-    let density = density(id, false);
+    let density = density(Category::CutIn, "2", false);
     let profile = Profile::load("paper").unwrap();
     let mixture = density.kde.mixture().unwrap();
     for source in [SampleSource::Random, SampleSource::Sobol] {
@@ -142,7 +129,7 @@ fn samples_are_the_same_whatever_the_chunks_threads_and_instructions() {
     let profile = Profile::load("paper").unwrap();
     for id in Parameterization::ALL {
         for (source, n) in [(SampleSource::Random, 300), (SampleSource::Sobol, 100)] {
-            let density = density(id, false);
+            let density = density(id.category, id.key, false);
             let plan = plan_samples(&density, &profile, &options(n, source)).unwrap();
             let whole = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
             assert!(whole == outcomes(&plan, &CpuBackend::scalar(), &[0, 1, 37, n]), "{id:?} scalar, other chunks");
@@ -163,9 +150,9 @@ fn a_device_makes_the_same_lanes_of_the_same_samples() {
     let mut compared = 0;
     for profile in ["paper", "un-r157"].map(|name| Profile::load(name).unwrap()) {
         for id in Parameterization::ALL {
-            for (source, with_thw) in [(SampleSource::Random, false), (SampleSource::Sobol, false)] {
+            for source in [SampleSource::Random, SampleSource::Sobol] {
                 let n = 400;
-                let density = density(id, with_thw);
+                let density = density(id.category, id.key, false);
                 let plan = plan_samples(&density, &profile, &options(n, source)).unwrap();
                 let ours = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
                 let theirs = outcomes(&plan, &*backend, &[0, 3, 150, n]);
@@ -185,10 +172,12 @@ fn a_device_refuses_the_draws_that_the_host_refuses() {
     for (category, key) in [(Category::CutIn, "7"), (Category::CutOut, "e"), (Category::CutOut, "g")] {
         // Left and right in one decomposition: many draws are in the wrong lane.
         let parameterization = ParameterizationOptions::default();
-        let options = FitOptions { parameterization, ..FitOptions::default() };
-        let density = density_with(Parameterization::find(category, key).unwrap(), options);
-        for (source, n) in [(SampleSource::Random, 400), (SampleSource::Sobol, 400)] {
-            let plan = plan_samples(&density, &profile, &self::options(n, source)).unwrap();
+        let fit = FitOptions { parameterization, valid_draws: 1000, ..FitOptions::default() };
+        let id = Parameterization::find(category, key).unwrap();
+        let density = DensityModel::fit(id, scenarios_of(12), &provenance(), &fit).unwrap().model;
+        let n = 400;
+        for source in [SampleSource::Random, SampleSource::Sobol] {
+            let plan = plan_samples(&density, &profile, &options(n, source)).unwrap();
             let generator = plan.generator().unwrap();
             let refused = (0..n).filter(|index| generator.draw(*index).tries > 1).count();
             assert!(refused > 5, "{key} {source:?}: {refused} refused");
@@ -203,25 +192,25 @@ fn a_device_draws_headways_and_given_points_alike() {
     let Some(backend) = common::device::software_backend() else { return };
     let profile = Profile::load("paper").unwrap();
     let n = 500;
-    for id in [("1", Category::CutIn), ("b", Category::CutOut), ("f", Category::CutOut), ("ii", Category::Lvd)] {
-        let id = Parameterization::find(id.1, id.0).unwrap();
-        let density = density(id, true);
+    for (category, key) in
+        [(Category::CutIn, "1"), (Category::CutOut, "b"), (Category::CutOut, "f"), (Category::Lvd, "ii")]
+    {
+        let density = density(category, key, true);
         let options = SampleOptions { headways: SampleHeadways::Sampled, ..options(n, SampleSource::Random) };
         let plan = plan_samples(&density, &profile, &options).unwrap();
         let ours = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
-        assert!(ours == outcomes(&plan, &*backend, &[0, 77, n]), "{}", id.key);
+        assert!(ours == outcomes(&plan, &*backend, &[0, 77, n]), "{key}");
         let points = density.kde.points();
         let given = plan_points(&density, points, &profile, &ModelId::ALL, &SampleHeadways::Sampled).unwrap();
         let last = points.len() as u64;
         let ours = outcomes(&given, &CpuBackend::lane_arithmetic(), &[0, last]);
-        assert!(ours == outcomes(&given, &*backend, &[0, 5, last]), "{} given", id.key);
+        assert!(ours == outcomes(&given, &*backend, &[0, 5, last]), "{key} given");
     }
 }
 
 #[test]
 fn indices_beyond_32_bits_are_samples_of_their_own() {
-    let id = Parameterization::find(Category::CutIn, "1").unwrap();
-    let density = density(id, false);
+    let density = density(Category::CutIn, "1", false);
     let profile = Profile::load("paper").unwrap();
     let plan = plan_samples(&density, &profile, &options(1 << 34, SampleSource::Random)).unwrap();
     let (low, high) = (5_u64, (1_u64 << 32) + 5);
@@ -242,8 +231,7 @@ fn indices_beyond_32_bits_are_samples_of_their_own() {
 
 #[test]
 fn verdicts_of_samples_come_without_their_values_too() {
-    let id = Parameterization::find(Category::Lvd, "iv").unwrap();
-    let density = density(id, false);
+    let density = density(Category::Lvd, "iv", false);
     let profile = Profile::load("paper").unwrap();
     let plan = plan_samples(&density, &profile, &options(2000, SampleSource::Random)).unwrap();
     let cpu = CpuBackend::lane_arithmetic();
@@ -275,18 +263,15 @@ fn failures_of_samples_and_studies_vary_smoothly_with_the_time_step() {
         }
         counts.iter().flatten().map(|&count| count as f64 / chunk.verdicts.len() as f64).collect()
     };
-    let densities: Vec<DensityModel> = [(Category::CutIn, "1"), (Category::CutOut, "a"), (Category::Lvd, "i")]
-        .into_iter()
-        .map(|(category, key)| density(Parameterization::find(category, key).unwrap(), false))
-        .collect();
+    let densities = [(Category::CutIn, "1"), (Category::CutOut, "a"), (Category::Lvd, "i")]
+        .map(|(category, key)| density(category, key, false));
     let shares = |dt_s: f64| -> Vec<Vec<f64>> {
         let profile = Profile::load("paper").unwrap().with_dt(dt_s).unwrap();
-        let sampled = densities
-            .iter()
-            .map(|density| failures(&plan_samples(density, &profile, &options(4000, SampleSource::Random)).unwrap()));
+        let options = options(4000, SampleSource::Random);
+        let sampled = densities.iter().map(|density| failures(&plan_samples(density, &profile, &options).unwrap()));
         let studied = Category::ALL.into_iter().map(|category| {
             let study = StudyOptions { categories: vec![category], ..StudyOptions::default() };
-            failures(&plan_study(scenarios(), &profile, &study).unwrap())
+            failures(&plan_study(scenarios_of(12), &profile, &study).unwrap())
         });
         sampled.chain(studied).collect()
     };
@@ -305,7 +290,7 @@ fn failures_of_samples_and_studies_vary_smoothly_with_the_time_step() {
 
 #[test]
 fn a_plan_has_no_more_samples_than_points() {
-    let density = density(Parameterization::find(Category::CutIn, "1").unwrap(), false);
+    let density = density(Category::CutIn, "1", false);
     let profile = Profile::load("paper").unwrap();
     let plan = |samples| plan_samples(&density, &profile, &options(samples, SampleSource::Sobol));
     assert!(plan(1 << 32).is_ok());

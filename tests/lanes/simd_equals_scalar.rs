@@ -2,6 +2,7 @@
 //! this machine, whatever the profile, the number of threads and the cut into calls.
 
 use crate::common::lane_sets::{forms, random, small_study, thresholds};
+use crate::common::mined::scenarios_of;
 use lanesweep::engine::verify::{Comparison, compare};
 use lanesweep::engine::{
     Backend, CpuBackend, Headway, Instructions, LanePlan, LaneRunner, Outcome, Verdicts, Wanted, same_words,
@@ -9,9 +10,7 @@ use lanesweep::engine::{
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::study::{StudyOptions, plan_study};
-use lanesweep::scenario::Category;
-use lanesweep::traffic::mining::{MiningOptions, mine_generated};
-use lanesweep::traffic::trajectory::generator::GeneratorOptions;
+use lanesweep::scenario::{Category, Scenario};
 
 /// Batches on every instruction set of this machine.
 fn in_batches() -> Vec<CpuBackend<f32>> {
@@ -68,15 +67,8 @@ fn every_word_of_a_small_study_is_equal() {
 /// one that most lanes reach, so that slots stay free beside lanes that go on.
 #[test]
 fn any_number_of_headways_gives_the_same_words() {
-    let generator = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
-    let mut scenarios = mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap().scenarios;
-    for category in Category::ALL {
-        let mut seen = 0;
-        scenarios.retain(|scenario| {
-            seen += u32::from(scenario.category == category);
-            scenario.category != category || seen <= 2
-        });
-    }
+    let of = |category| scenarios_of(1).iter().filter(move |s| s.category == category).take(2).cloned();
+    let scenarios: Vec<Scenario> = Category::ALL.into_iter().flat_map(of).collect();
     let mut short = Profile::load("paper").unwrap();
     short.frame.time_cap_s = 2.5;
     for (profile, count) in

@@ -6,11 +6,12 @@
 use std::fs;
 use std::path::Path;
 
-use crate::common::program::ran;
+use crate::common::program::{ran, table as csv};
 
 /// The figures of cut-ins whose tables are kept.
 const KEPT: [&str; 5] = ["f1", "radar", "recall-precision", "f1-by-parameters", "headways"];
 
+#[derive(serde::Deserialize)]
 struct Row {
     panel: String,
     row: String,
@@ -26,17 +27,7 @@ fn study() -> tempfile::TempDir {
 }
 
 fn rows(csv: &str) -> Vec<Row> {
-    let mut reader = csv::Reader::from_reader(csv.as_bytes());
-    let header = reader.headers().unwrap().clone();
-    let at = |name: &str| header.iter().position(|column| column == name).unwrap();
-    let row = |record: csv::StringRecord| Row {
-        panel: record[at("panel")].to_owned(),
-        row: record[at("row")].to_owned(),
-        series: record[at("series")].to_owned(),
-        x: record[at("x")].parse().unwrap(),
-        y: record[at("y")].parse().ok(),
-    };
-    reader.records().map(|record| row(record.unwrap())).collect()
+    csv::Reader::from_reader(csv.as_bytes()).deserialize().map(Result::unwrap).collect()
 }
 
 fn number(tag: &str, key: &str) -> f64 {
@@ -70,20 +61,12 @@ fn every_f1_has_a_mark_at_its_value() {
     assert_eq!(drawn.len(), table.len());
     assert!(table.len() > 60);
     for (row, x) in table.iter().zip(drawn) {
-        assert!(
-            (left + (row.x + 0.02) / 1.04 * width - x).abs() < 0.02,
-            "{} {}: {} is drawn at {x}",
-            row.row,
-            row.series,
-            row.x
-        );
+        let is_there = (left + (row.x + 0.02) / 1.04 * width - x).abs() < 0.02;
+        assert!(is_there, "{} {}: {} is drawn at {x}", row.row, row.series, row.x);
         assert!(row.y.is_none() && !row.row.is_empty() && row.panel.is_empty());
     }
     // The same scores as in the table of the study.
-    let mut scores = csv::Reader::from_path(dir.path().join("f1.csv")).unwrap();
-    let header = scores.headers().unwrap().clone();
-    let at = header.iter().position(|column| column == "f1").unwrap();
-    let mut all: Vec<f64> = scores.records().filter_map(|record| record.unwrap()[at].parse().ok()).collect();
+    let mut all: Vec<f64> = csv(&dir.path().join("f1.csv")).iter().filter_map(|row| row["f1"].parse().ok()).collect();
     let mut shown: Vec<f64> = table.iter().map(|row| row.x).collect();
     all.sort_by(f64::total_cmp);
     shown.sort_by(f64::total_cmp);
@@ -112,35 +95,20 @@ fn a_mean_over_cells_is_that_of_the_scores_in_the_table() {
     let dir = tempfile::tempdir().unwrap();
     let study = "-q study --synth-recordings 6 --categories cut-in --cross-validate --backend cpu";
     ran(dir.path(), &format!("{study} --out ."));
-    let table = |name: &str| {
-        let mut reader = csv::Reader::from_path(dir.path().join(name)).unwrap();
-        let header = reader.headers().unwrap().clone();
-        let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
-        move |row: usize, column: &str| {
-            let at = header.iter().position(|name| name == column).unwrap();
-            rows.get(row).map(|row| row[at].to_owned())
-        }
-    };
-    let scores = table("f1.csv");
-    let mut cells = std::collections::BTreeMap::<(String, String), Vec<(String, Option<f64>)>>::new();
-    for row in (0..).take_while(|row| scores(*row, "f1").is_some()) {
-        let of = |column: &str| scores(row, column).unwrap();
-        let cell = cells.entry((of("model"), of("criterion"))).or_default();
-        cell.push((of("parameterization"), of("f1").parse().ok()));
+    let mut cells = std::collections::BTreeMap::<[String; 2], Vec<(String, Option<f64>)>>::new();
+    for row in csv(&dir.path().join("f1.csv")) {
+        let cell = cells.entry(["model", "criterion"].map(|name| row[name].clone())).or_default();
+        cell.push((row["parameterization"].clone(), row["f1"].parse().ok()));
     }
     let shared: Vec<_> = cells.values().filter(|cell| cell.iter().all(|(_, f1)| f1.is_some())).collect();
-    let means = table("f1-by-parameters-cut-in.csv");
-    let mut compared = 0;
-    for row in (0..).take_while(|row| means(*row, "label").is_some()) {
-        let of = |column: &str| means(row, column).unwrap();
-        if !of("panel").starts_with("all criteria") || of("label").is_empty() {
-            continue;
-        }
-        let own = shared.iter().flat_map(|cell| cell.iter()).filter(|(key, _)| *key == of("label"));
+    let mut means = csv(&dir.path().join("f1-by-parameters-cut-in.csv"));
+    means.retain(|row| row["panel"].starts_with("all criteria") && !row["label"].is_empty());
+    let compared = means.len();
+    for row in means {
+        let own = shared.iter().flat_map(|cell| cell.iter()).filter(|(key, _)| *key == row["label"]);
         let own: Vec<f64> = own.filter_map(|(_, f1)| *f1).collect();
         let mean = own.iter().sum::<f64>() / own.len() as f64;
-        assert!((mean - of("y").parse::<f64>().unwrap()).abs() < 1e-9, "{}: {mean}", of("label"));
-        compared += 1;
+        assert!((mean - row["y"].parse::<f64>().unwrap()).abs() < 1e-9, "{}: {mean}", row["label"]);
     }
     assert_eq!(compared, 7, "the paper's parameterizations");
 }

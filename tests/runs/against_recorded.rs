@@ -1,8 +1,6 @@
 //! Rates of samples beside those of the recorded scenarios: which of them are sound.
 
-use std::sync::OnceLock;
-
-use crate::common::mined::{fitted, mined};
+use crate::common::mined::{fitted, scenarios_of};
 use lanesweep::Place;
 use lanesweep::engine::{CpuBackend, Executor, Headway};
 use lanesweep::model::criterion::Criterion;
@@ -15,8 +13,7 @@ use lanesweep::stats::density::DensityModel;
 use lanesweep::stats::estimate::{Search, Verdict, Warning};
 
 fn density_of(key: &str, with_thw: bool) -> DensityModel {
-    static MINED: OnceLock<Vec<Scenario>> = OnceLock::new();
-    fitted(MINED.get_or_init(|| mined(30).scenarios), Category::CutIn, key, with_thw)
+    fitted(scenarios_of(30), Category::CutIn, key, with_thw)
 }
 
 fn density(key: &str) -> DensityModel {
@@ -74,9 +71,8 @@ fn rates_that_are_sound_do_not_exclude_each_other() {
     assert!(sound.len() >= 2, "nothing is sound: {}", sound.len());
     for (a, of_a) in &sound {
         for (b, of_b) in sound.iter().filter(|(_, row)| row.model == of_a.model) {
-            let ([low, high], other) =
-                ([of_a.estimate.interval.low, of_a.estimate.interval.high], of_b.estimate.interval);
-            assert!(low <= other.high && other.low <= high, "{a} and {b}: {of_a:?} {of_b:?}");
+            let (own, other) = (of_a.estimate.interval, of_b.estimate.interval);
+            assert!(own.low <= other.high && other.low <= own.high, "{a} and {b}: {of_a:?} {of_b:?}");
         }
     }
 }

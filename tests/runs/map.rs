@@ -1,10 +1,11 @@
 //! Maps: a grid's arithmetic, its cells against single lanes, and what is known of the JRC's grids.
 
-use crate::common::program::{self, files, json, ran, refused, said};
+use crate::common::lane_sets::run_case;
+use crate::common::program::{self, files, json, ran, refused, said, table};
 
 use std::path::Path;
 
-use lanesweep::engine::{Constants, CpuBackend, Executor, Headway, LaneCase, Silent, Start, Verdicts};
+use lanesweep::engine::{CpuBackend, Executor, Headway, Silent, Start, Verdicts};
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
@@ -13,7 +14,7 @@ use lanesweep::run::grid::{
     CaseQuantity, CellOutcome, Grid, GridAxis, GridMap, GridParts, GridPlan, Map, MapGrids, MapOptions, MapParameter,
     boundary,
 };
-use lanesweep::scenario::{Category, Tables};
+use lanesweep::scenario::Category;
 use proptest::prelude::*;
 
 fn axis(category: Category, text: &str) -> GridAxis {
@@ -51,6 +52,11 @@ fn profile(name: &str) -> Profile {
 fn swept(plan: &GridPlan) -> GridMap {
     let backend = CpuBackend::lane_arithmetic();
     GridMap::sweep(plan, &Executor::new(&backend)).unwrap().0
+}
+
+/// The map of a grid.
+fn mapped(grid: Grid, profile: &Profile, models: &[ModelId]) -> GridMap {
+    swept(&GridPlan::new(grid, profile, models).unwrap())
 }
 
 fn percent(map: &GridMap, model: usize) -> f64 {
@@ -109,14 +115,11 @@ proptest! {
 
 /// One lane of a cell by itself, in the lane arithmetic: the case, encoded alone, from its gap or headway.
 fn alone(grid: &Grid, cell: usize, model: ModelId, profile: &Profile) -> Verdicts {
-    let mut tables = Tables::default();
-    let case = LaneCase::encode(&grid.case(cell, profile).unwrap(), profile, &mut tables);
     let start: Start<f32> = match grid.point(cell).get(CaseQuantity::Thw) {
         Some(thw_s) => Headway::ThwS(thw_s).start(),
         None => Headway::GapM(grid.gap_m(cell, model, profile)).start(),
     };
-    let constants = Constants::<f32>::resolve(profile, grid.category());
-    constants.run(model, &case.cast(), &tables.cast(), start, &mut Silent).verdicts
+    run_case(profile, &grid.case(cell, profile).unwrap(), model, start, &mut Silent).verdicts
 }
 
 #[test]
@@ -134,7 +137,7 @@ fn every_cell_is_the_lane_that_its_numbers_say() {
     ] {
         for name in ["paper", "jrc-2021", "un-r157"] {
             let profile = profile(name);
-            let map = swept(&GridPlan::new(grid.clone(), &profile, &ModelId::ALL).unwrap());
+            let map = mapped(grid.clone(), &profile, &ModelId::ALL);
             for (at, &model) in ModelId::ALL.iter().enumerate() {
                 for cell in 0..grid.cell_count() {
                     let (ours, single) = (map.verdicts(at, cell), alone(&grid, cell, model, &profile));
@@ -149,7 +152,7 @@ fn every_cell_is_the_lane_that_its_numbers_say() {
 fn a_cell_is_what_simulate_says_of_the_same_numbers() {
     let speeds = "ego_speed_mps=30 other_speed_mps=18";
     let grid = grid(Category::CutIn, "gap_m=7,21,35 lateral_speed_mps=0.4,1.1", "", speeds);
-    let map = swept(&GridPlan::new(grid.clone(), &profile("paper"), &[ModelId::Rss]).unwrap());
+    let map = mapped(grid.clone(), &profile("paper"), &[ModelId::Rss]);
     let mut failures = 0;
     for cell in 0..grid.cell_count() {
         let point = grid.point(cell);
@@ -255,7 +258,7 @@ fn shares_of_a_preset_vary_smoothly_with_the_time_step() {
             let shares = |dt_s: f64| -> Vec<(String, f64)> {
                 let profile = profile(name).with_dt(dt_s).unwrap();
                 let of = |preset: presets::Preset| {
-                    let map = swept(&GridPlan::new(preset.grid.clone(), &profile, &preset.models).unwrap());
+                    let map = mapped(preset.grid.clone(), &profile, &preset.models);
                     let share = |at: usize| percent(&map, at);
                     let models = preset.models.iter().enumerate();
                     models.map(|(at, m)| (format!("{} {}", preset.grid.name(), m.name()), share(at))).collect()
@@ -298,8 +301,7 @@ fn a_map_in_which_every_lane_ends_at_the_cap_is_an_error_that_says_what_to_check
     // CCHDM avoids every collision with a decelerating leader, in runs that all go on to the cap.
     let jrc = profile("jrc-2021");
     let lvd = Presets::Jrc.of(Category::Lvd, &jrc).unwrap().remove(0);
-    let plan = GridPlan::new(lvd.grid, &jrc, &[ModelId::Cchdm]).unwrap();
-    assert_eq!(swept(&plan).failures(0, Criterion::Collision), 0);
+    assert_eq!(mapped(lvd.grid, &jrc, &[ModelId::Cchdm]).failures(0, Criterion::Collision), 0);
 }
 
 #[test]
@@ -464,18 +466,15 @@ fn a_cell_without_a_conflict_is_a_case_without_one() {
             for preset in presets.of(category, &profile).unwrap() {
                 let models = [ModelId::Cchdm, ModelId::Fsm];
                 let grid = preset.grid;
-                let map = swept(&GridPlan::new(grid.clone(), &profile, &models).unwrap());
+                let map = mapped(grid.clone(), &profile, &models);
                 for (at, &model) in models.iter().enumerate() {
                     // A prime number of cells apart: all panels, gaps and speeds.
                     for cell in (0..grid.cell_count()).step_by(499) {
                         let point = grid.point(cell);
                         let plain = point.plain_case(category, &profile).unwrap();
                         let headway = Headway::GapM(grid.gap_m(cell, model, &profile));
-                        let check = Check {
-                            subject: Subject::plain(&plain, headway),
-                            profiles: vec![profile.clone()],
-                            models: vec![model],
-                        };
+                        let (subject, profiles) = (Subject::plain(&plain, headway), vec![profile.clone()]);
+                        let check = Check { subject, profiles, models: vec![model] };
                         let judged = check.run_without_boundaries().unwrap().remove(0);
                         let outcome = map.outcome(at, cell, Criterion::Collision);
                         let is_no_conflict = judged.verdicts.answer() == Answer::NoConflict;
@@ -510,11 +509,7 @@ fn tables_files_and_legends_of_a_map_count_the_same_cells() {
         let stdout = ran(dir.path(), &format!("-q map {what} --models CCHDM,FSM --out ."));
         let read = |name: &str| std::fs::read_to_string(dir.path().join(name)).unwrap();
         let record = json(&dir.path().join("map.json"));
-        let cells = read("cells.csv");
-        let mut rows = cells.lines().map(|line| line.split(',').collect::<Vec<_>>());
-        let header = rows.next().unwrap();
-        let column = |name: &str| header.iter().position(|column| *column == name).unwrap();
-        let rows: Vec<Vec<&str>> = rows.collect();
+        let rows = table(&dir.path().join("cells.csv"));
         let mut no_conflict = 0;
         for grid in record["grids"].as_array().unwrap() {
             let (name, all) = (grid["name"].as_str().unwrap(), grid["cells"].as_u64().unwrap());
@@ -527,9 +522,9 @@ fn tables_files_and_legends_of_a_map_count_the_same_cells() {
                 let mut sum = 0;
                 for (word, count) in share["outcomes"].as_object().unwrap() {
                     let count = count.as_u64().unwrap();
-                    let in_file = rows.iter().filter(|row| {
-                        row[column("map")] == name && row[column("model")] == model && row[column("outcome")] == word
-                    });
+                    let in_file = rows
+                        .iter()
+                        .filter(|row| row["map"] == name && row["model"] == model && row["outcome"] == *word);
                     assert_eq!(in_file.count() as u64, count, "{what}, {name}, {model}: {word}");
                     let drawn = svg.contains(&format!(">{word}: {count} of {all}<"));
                     assert_eq!(drawn, count > 0, "{what}, {name}, {model}: {word}");
@@ -591,7 +586,7 @@ fn named_options_explain_every_cell_between_the_readings() {
         let maps = Category::ALL.map(|category| {
             let presets = Presets::Jrc.of(category, profile).unwrap();
             let of = |preset: presets::Preset| {
-                let map = swept(&GridPlan::new(preset.grid, profile, &ModelId::ALL).unwrap());
+                let map = mapped(preset.grid, profile, &ModelId::ALL);
                 (0..ModelId::ALL.len()).flat_map(|model| failed(&map, model)).collect::<Vec<_>>()
             };
             presets.into_iter().flat_map(of).collect()
@@ -600,23 +595,21 @@ fn named_options_explain_every_cell_between_the_readings() {
     };
     let goal = collisions(&jrc);
     let row = |what: &str, profile: &Profile| -> usize {
-        let differing: Vec<usize> = collisions(profile)
-            .iter()
-            .zip(&goal)
-            .map(|(ours, theirs)| ours.iter().zip(theirs).filter(|(a, b)| a != b).count())
-            .collect();
+        let ours = collisions(profile);
+        let pairs = ours.iter().zip(&goal).map(|(ours, theirs)| ours.iter().zip(theirs));
+        let differing: Vec<usize> = pairs.map(|pairs| pairs.filter(|(a, b)| a != b).count()).collect();
         println!("| {what} | {} | {} | {} |", differing[0], differing[1], differing[2]);
         differing.iter().sum()
     };
     let total: usize = goal.iter().map(Vec::len).sum();
-    println!(
-        "verdicts: {} of {total}",
-        goal.iter().map(|cells| cells.len().to_string()).collect::<Vec<_>>().join(", ")
-    );
+    println!("verdicts: {:?} of {total}", goal.iter().map(Vec::len).collect::<Vec<_>>());
     row("`un-r157`", &reading);
     macro_rules! step {
         ($what:literal, $($table:ident.$key:ident)+) => {{
-            $(reading.$table.$key = jrc.$table.$key.clone();)+
+            $(
+                assert_ne!(reading.$table.$key, jrc.$table.$key, "{}.{}", stringify!($table), stringify!($key));
+                reading.$table.$key = jrc.$table.$key.clone();
+            )+
             row($what, &reading)
         }};
     }
@@ -641,4 +634,7 @@ fn named_options_explain_every_cell_between_the_readings() {
     step!("`frame.end_when_settled`, `time_cap_s`", frame.end_when_settled frame.time_cap_s);
     step!("`frame.start_shift` (with it the JRC's cases and starts)", frame.start_shift);
     assert_eq!(step!("`criteria.gate`", criteria.gate), 0, "nothing else tells the readings apart");
+    (reading.name, reading.description, reading.reg157.clause) =
+        (jrc.name.clone(), jrc.description.clone(), jrc.reg157.clause.clone());
+    assert_eq!(reading, jrc, "every difference is a named option");
 }

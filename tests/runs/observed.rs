@@ -1,34 +1,30 @@
 //! `--thw observed`: each scenario from its recorded gap.
 
-use crate::common::mined::{fitted, mined};
-use crate::common::program::{ran, refused};
+use crate::common::mined::{fitted, kept, mined, scenarios_of};
+use crate::common::program::ran;
 use lanesweep::Error;
 use lanesweep::engine::{CpuBackend, Executor, Headway, LaneKey, LaneRunner};
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::{Job, Shard};
 use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, plan_samples};
 use lanesweep::run::study::{Study, StudyOptions, plan_study};
-use lanesweep::scenario::{Category, Scenario};
+use lanesweep::scenario::Category;
 
 fn observed() -> StudyOptions {
     StudyOptions { headways: vec![Headway::Observed], ..StudyOptions::default() }
 }
 
-fn kept(data: &lanesweep::traffic::mining::Collection, category: Category) -> Vec<&Scenario> {
-    data.scenarios.iter().filter(|s| s.kept && s.category == category).collect()
-}
-
 #[test]
 fn s_and_every_s_prime_start_from_the_recorded_gap() {
-    let data = mined(3);
+    let data = scenarios_of(3);
     let paper = Profile::load("paper").unwrap();
-    let plan = plan_study(&data.scenarios, &paper, &observed()).unwrap();
+    let plan = plan_study(data, &paper, &observed()).unwrap();
     let imposed = StudyOptions { headways: vec![Headway::GapM(0.0)], ..StudyOptions::default() };
-    let imposed = plan_study(&data.scenarios, &paper, &imposed).unwrap();
+    let imposed = plan_study(data, &paper, &imposed).unwrap();
     assert_ne!(plan.hash(), imposed.hash());
     let runner = LaneRunner::<f64>::new(&plan);
     for (at, block) in plan.blocks.iter().enumerate() {
-        for (unit, scenario) in kept(&data, block.category).into_iter().enumerate() {
+        for (unit, scenario) in kept(data, block.category).into_iter().enumerate() {
             let gap_m = scenario.gap0.unwrap();
             for variant in 0..block.variants.len() {
                 let (ours, without) = (plan.case(at, unit as u64, variant), imposed.case(at, unit as u64, variant));
@@ -69,13 +65,13 @@ fn a_scenario_without_a_recorded_gap_is_named_and_a_mixture_of_headways_is_refus
     assert!(matches!(&error, Error::Input { .. }) && error.to_string().contains(&id), "{error}");
     assert!(error.to_string().contains("gap0"), "{error}");
     let mixed = StudyOptions { headways: vec![Headway::Observed, Headway::ThwS(1.0)], ..StudyOptions::default() };
-    let error = plan_study(&mined(1).scenarios, &paper, &mixed).err().unwrap().to_string();
+    let error = plan_study(scenarios_of(1), &paper, &mixed).err().unwrap().to_string();
     assert!(error.contains("cannot be combined"), "{error}");
 }
 
 #[test]
 fn a_density_without_headways_cannot_draw_observed_ones() {
-    let density = fitted(&mined(2).scenarios, Category::CutIn, "2", false);
+    let density = fitted(scenarios_of(2), Category::CutIn, "2", false);
     let options = SampleOptions::new(Estimator::CRUDE, 100, SampleHeadways::Each(vec![Headway::Observed]));
     let paper = Profile::load("paper").unwrap();
     let error = plan_samples(&density, &paper, &options).err().unwrap();
@@ -91,5 +87,4 @@ fn every_verb_takes_observed_headways() {
     assert!(answer.contains("recorded THW"), "{answer}");
     ran(dir, &format!("-q fit --parameterizations i --with-thw --out i.json {small}"));
     ran(dir, "-q sample i.json --samples 2000 --thw observed --backend cpu --out sample");
-    refused(dir, "-q study --thw observed,1.0", 2, "cannot be combined");
 }

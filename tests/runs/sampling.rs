@@ -2,7 +2,7 @@
 //! of good and bad input.
 
 use crate::common::mined::{fitted, scenarios};
-use crate::common::program::{json, ran, refused};
+use crate::common::program::{json, ran, refused, table};
 use crate::common::{self, program};
 
 use std::path::Path;
@@ -81,13 +81,6 @@ fn parts_of_different_runs_and_doubled_parts_do_not_join() {
     assert!(error.contains("samples 99 to 99 are in both"), "{error}");
 }
 
-type Row = std::collections::HashMap<String, String>;
-
-fn rows_of(path: &Path) -> Vec<Row> {
-    let mut reader = csv::Reader::from_path(path).unwrap();
-    reader.deserialize().collect::<Result<_, _>>().unwrap()
-}
-
 /// The first `limit` failing rows of each model and criterion, as lines of the table.
 fn first_failing(table: &str, limit: usize) -> String {
     let mut lines = table.lines();
@@ -136,7 +129,7 @@ fn a_run_in_parts_is_the_run_in_one_and_its_failing_lanes_are_the_first_of_all_r
     assert!(read("first.csv") == all && read("joined.csv") == all, "the first thousand");
     assert!(read("seven.csv") == seven && read("counted.csv") == seven, "the first seven");
     // A row says how to run its lane again, and it is the same lane.
-    for row in rows_of(&dir.join("seven.csv")).iter().step_by(9) {
+    for row in table(&dir.join("seven.csv")).iter().step_by(9) {
         let key = format!("#{}/{}/{}/{}", row["sample"], row["parameterization"], row["headway"], row["model"]);
         let (code, trace, summary) = program::lanesweep(dir, &["simulate", "--from", "whole", "--lane", &key]);
         assert!(code == 0 && trace.starts_with("t_s,"), "{summary}");
@@ -153,12 +146,12 @@ fn rows_hold_every_lane_of_a_reduced_density_with_its_point() {
     let dir = tempfile::tempdir().unwrap();
     write_density(&dir.path().join("d.json"), &density(Category::CutOut, "f")).unwrap();
     ran(dir.path(), "-q sample d.json --samples 200 --thw 0.6 --rows rows.csv --backend cpu");
-    let rows = rows_of(&dir.path().join("rows.csv"));
+    let rows = table(&dir.path().join("rows.csv"));
     assert_eq!(rows.len(), 200 * MODELS);
     assert!(rows.iter().all(|row| row["c5"].parse::<f32>().is_ok() && row["headway"] == "0.6s"));
     let failed = rows.iter().filter(|row| row["collision"] == "1" && row["model"] == "FSM").count();
-    let table = estimates(dir.path(), "lanesweep-sample");
-    let row = table.lines().find(|line| line.contains("mc,FSM,collision,0.6s")).unwrap();
+    let estimates = estimates(dir.path(), "lanesweep-sample");
+    let row = estimates.lines().find(|line| line.contains("mc,FSM,collision,0.6s")).unwrap();
     assert_eq!(row.split(',').nth(7).unwrap(), failed.to_string());
 }
 
@@ -186,8 +179,8 @@ fn a_searched_proposal_can_be_sampled_again_and_in_shards_with_its_failing_draws
     let _ = ["1/2", "0/2"].map(|shard| ran(dir, &format!("{given} --out given --shard {shard}")));
     assert_eq!(merged("given"), estimates(dir, "again"));
     for (whole, parts) in [("is.csv", "searched.csv"), ("again.csv", "given.csv")] {
-        let rows = rows_of(&dir.join(whole));
-        assert!(rows == rows_of(&dir.join(parts)), "{whole}");
+        let rows = table(&dir.join(whole));
+        assert!(rows == table(&dir.join(parts)), "{whole}");
         assert!(rows.len() == 1000 && rows.iter().all(|row| row["collision"] == "1"), "{whole}: {}", rows.len());
     }
     let estimate = |folder: &str| json(&dir.join(folder).join("estimate.json"))["estimates"][0]["estimate"].clone();

@@ -2,8 +2,8 @@
 //! make themselves is read, or refused with file, row and column.
 #![cfg(feature = "parquet")]
 
-use crate::common::mined::fitted;
-use crate::common::program::{ran, refused, said};
+use crate::common::mined::{fitted, scenarios_of};
+use crate::common::program::{ran, refused};
 use crate::common::tables::made;
 
 use std::collections::BTreeMap;
@@ -12,15 +12,8 @@ use std::path::Path;
 use lanesweep::scenario::{Category, Ego, Other, Scenario, Side, read_scenarios, write_scenarios, write_scenarios_to};
 use lanesweep::stats::density::write_density;
 use lanesweep::support::plausibility::LIMITS;
-use lanesweep::traffic::mining::{MiningOptions, mine_generated};
-use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 use made::{Read, read};
 use proptest::prelude::*;
-
-fn synthetic() -> Vec<Scenario> {
-    let options = GeneratorOptions { recordings: 2, duration_s: 120.0, ..GeneratorOptions::default() };
-    mine_generated(&options, &MiningOptions::default(), || Ok(())).unwrap().scenarios
-}
 
 /// The scenarios as text, which has every bit of theirs.
 fn text_of(scenarios: &[Scenario]) -> String {
@@ -116,21 +109,10 @@ fn a_study_gives_the_same_bytes_from_parquet_and_from_json_lines() {
 }
 
 #[test]
-fn what_only_has_the_name_of_a_parquet_file_is_refused() {
-    let dir = tempfile::tempdir().unwrap();
-    std::fs::write(dir.path().join("density.parquet"), "{\"parameterization\": 2}\n").unwrap();
-    let (code, text) = said(dir.path(), "study --scenarios density.parquet");
-    assert_eq!(code, 3);
-    assert!(text.contains("density.parquet: not a Parquet file that can be read"), "{text}");
-    assert!(text.contains("help: write the file again, or use JSON Lines or CSV"), "{text}");
-}
-
-#[test]
 fn sampled_rows_are_the_same_in_every_format() {
     let dir = tempfile::tempdir().unwrap();
     let at = dir.path();
-    let lvd: Vec<Scenario> = synthetic().into_iter().filter(|s| s.category == Category::Lvd && s.kept).collect();
-    write_density(&at.join("d.json"), &fitted(&lvd, Category::Lvd, "i", false)).unwrap();
+    write_density(&at.join("d.json"), &fitted(scenarios_of(2), Category::Lvd, "i", false)).unwrap();
     for (name, threads) in [("r.csv", "2"), ("r.jsonl", "2"), ("r.parquet", "2"), ("again.parquet", "1")] {
         let sample = "-q sample d.json --samples 300 --thw 0.6,1.2 --backend cpu";
         ran(at, &format!("{sample} --rows {name} --threads {threads}"));
@@ -189,13 +171,10 @@ fn check_facts(table: &Read, kind: &str, has_lanes: bool) {
         assert_eq!((word["unit"].as_str().unwrap(), word["description"].as_str().unwrap()), (&**unit, &**description));
         assert!(!description.is_empty() && description.ends_with('.'), "{word}");
         let text = |key: &str| word[key].as_str().unwrap().to_owned();
-        let row = rows.iter().find(|row| row[1] == text("name"));
-        let row = match row {
-            Some(row) => row,
-            // The parameters of a density are in one row.
-            None if kind == "samples" => rows.iter().find(|row| row[1] == "…").unwrap(),
-            None => panic!("docs/src/tables.md has no row for `{}` in its section on {kind}", text("name")),
-        };
+        // The parameters of a density are in one row.
+        let of_all = rows.iter().find(|row| kind == "samples" && row[1] == "…");
+        let row = rows.iter().find(|row| row[1] == text("name")).or(of_all);
+        let row = row.unwrap_or_else(|| panic!("docs/src/tables.md, section on {kind}: no row for {word}"));
         assert_eq!(row[2], text("type"), "the chapter's type of {}", text("name"));
         if row[1] != "…" {
             let shown = if unit.is_empty() { "–" } else { unit };
@@ -219,13 +198,6 @@ fn an_ending_that_is_unknown_is_answered_with_the_known_ones_before_any_work() {
     ] {
         refused(dir.path(), line, 2, hint);
     }
-}
-
-#[test]
-fn a_lane_table_must_not_replace_the_scenarios_it_is_of() {
-    let dir = tempfile::tempdir().unwrap();
-    write_scenarios(&dir.path().join("s.parquet"), &synthetic()).unwrap();
-    refused(dir.path(), "study --scenarios s.parquet --rows s.parquet", 2, "would be overwritten");
 }
 
 #[test]

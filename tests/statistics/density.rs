@@ -2,9 +2,7 @@
 //! point and on to a case.
 
 use crate::common;
-use crate::common::mined::mined;
-
-use std::sync::OnceLock;
+use crate::common::mined::{self, scenarios_of};
 
 use lanesweep::run::sampling::{proposal_from_text, proposal_text};
 use lanesweep::scenario::parameterization::{
@@ -94,8 +92,8 @@ fn scale_bandwidth_density_and_probabilities_are_those_of_the_published_program(
         let mixture = theirs.mixture().unwrap();
         let mut sum = 0.0;
         let queries = rows(&case["query"]);
-        for (x, (density, cdf)) in queries.iter().zip(numbers(&case["density"]).into_iter().zip(numbers(&case["cdf"])))
-        {
+        let golden = numbers(&case["density"]).into_iter().zip(numbers(&case["cdf"]));
+        for (x, (density, cdf)) in queries.iter().zip(golden) {
             let log_density = mixture.log_density(x);
             assert!((log_density.exp() / density - 1.0).abs() < 1e-9, "density {} {density}", log_density.exp());
             let ours = probability(&theirs, &vec![f64::NEG_INFINITY; d], x);
@@ -162,14 +160,8 @@ fn a_density_that_cannot_be_told_is_refused_with_the_reason() {
     assert!(nan.contains("kernel 2") && nan.contains("`x1`"), "{nan}");
 }
 
-/// Kept scenarios of all categories, mined from generated recordings.
-fn scenarios() -> &'static [Scenario] {
-    static MINED: OnceLock<Vec<Scenario>> = OnceLock::new();
-    MINED.get_or_init(|| mined(4).scenarios)
-}
-
 fn kept(category: Category) -> Vec<&'static Scenario> {
-    scenarios().iter().filter(|s| s.category == category && s.kept).collect()
+    mined::kept(scenarios_of(4), category)
 }
 
 fn space(id: Parameterization, options: &ParameterizationOptions, with_thw: bool) -> ParameterSpace {
@@ -189,7 +181,7 @@ fn facts() -> DataProvenance {
 fn model(category: Category, key: &str) -> DensityModel {
     let id = Parameterization::find(category, key).unwrap();
     let options = FitOptions { valid_draws: 20_000, with_thw: true, ..Default::default() };
-    DensityModel::fit(id, scenarios(), &facts(), &options).unwrap().model
+    DensityModel::fit(id, scenarios_of(4), &facts(), &options).unwrap().model
 }
 
 /// Equal up to the rounding of T = (v0 − v1)/ā.

@@ -1,8 +1,6 @@
 //! What densities draw: scenarios of their category, not only points with a case.
 
-use std::sync::OnceLock;
-
-use crate::common::mined::{mined, provenance};
+use crate::common::mined::{self, provenance, scenarios_of};
 
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{SampleSource, generator_of};
@@ -12,13 +10,8 @@ use lanesweep::scenario::parameterization::{
 use lanesweep::scenario::{Category, Scenario, Side};
 use lanesweep::stats::density::{DensityModel, FitOptions};
 
-fn scenarios() -> &'static [Scenario] {
-    static MINED: OnceLock<Vec<Scenario>> = OnceLock::new();
-    MINED.get_or_init(|| mined(8).scenarios)
-}
-
 fn kept(category: Category) -> Vec<&'static Scenario> {
-    scenarios().iter().filter(|s| s.category == category && s.kept).collect()
+    mined::kept(scenarios_of(8), category)
 }
 
 fn options(svd_lateral: SvdLateral) -> ParameterizationOptions {
@@ -27,7 +20,7 @@ fn options(svd_lateral: SvdLateral) -> ParameterizationOptions {
 
 fn density(id: Parameterization, parameterization: ParameterizationOptions) -> DensityModel {
     let fit = FitOptions { parameterization, valid_draws: 20_000, ..FitOptions::default() };
-    DensityModel::fit(id, scenarios(), &provenance(), &fit).unwrap().model
+    DensityModel::fit(id, scenarios_of(8), &provenance(), &fit).unwrap().model
 }
 
 /// The fraction of draws that are refused because of where the target starts or ends.

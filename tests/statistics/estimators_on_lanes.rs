@@ -4,7 +4,7 @@
 //! two cores; LANESWEEP_DLR_HT names a folder of DLR-HT recordings in highD's format).
 
 use crate::common;
-use crate::common::mined::provenance;
+use crate::common::mined::{provenance, scenarios};
 
 use std::path::PathBuf;
 
@@ -17,8 +17,7 @@ use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::{DensityModel, FitOptions, read_density};
 use lanesweep::stats::estimate::{Estimate, Goal, Search, Verdict, adaptive, wilson};
-use lanesweep::traffic::mining::{MiningOptions, mine_folder, mine_generated};
-use lanesweep::traffic::trajectory::generator::GeneratorOptions;
+use lanesweep::traffic::mining::{MiningOptions, mine_folder};
 
 const LEVEL: f64 = 0.999;
 
@@ -43,14 +42,13 @@ fn crude(density: &DensityModel, profile: &Profile, model: ModelId, thw_s: f64, 
 /// Adaptive importance sampling at one seed, with its interval at 99.9 %.
 fn rare_estimate(density: &DensityModel, profile: &Profile, model: ModelId, thw_s: f64) -> Estimate {
     let goal = Goal { half_width: 0.2, max_draws: 1_000_000, max_crude: 10_000_000 };
-    adaptive_estimate(density, profile, model, thw_s, &goal, 4)
+    adaptive_estimate(density, profile, (model, thw_s), &goal, 4)
 }
 
 fn adaptive_estimate(
     density: &DensityModel,
     profile: &Profile,
-    model: ModelId,
-    thw_s: f64,
+    (model, thw_s): (ModelId, f64),
     goal: &Goal,
     seed: u64,
 ) -> Estimate {
@@ -99,22 +97,11 @@ fn compare(name: &str, scenarios: &[Scenario], category: Category, key: &str, sa
     }
     let estimate = rare_estimate(&density, &profile, model, thw_s);
     let i = estimate.interval;
-    println!(
-        "  {:.4e} [{:.4e}, {:.4e}] {} runs, variance reduction {:.2}, {}",
-        estimate.probability,
-        i.low,
-        i.high,
-        estimate.runs,
-        estimate.variance_reduction,
-        estimate.trust.draws()
-    );
+    let (p, runs, reduction) = (estimate.probability, estimate.runs, estimate.variance_reduction);
+    let found = format!("{p:.4e} [{:.4e}, {:.4e}] {runs} runs", i.low, i.high);
+    println!("  {found}, variance reduction {reduction:.2}, {}", estimate.trust.draws());
     assert!(i.holds(truth.probability), "{name}: {estimate:?} does not hold {:e}", truth.probability);
     assert_eq!(estimate.trust.draws(), Verdict::Sound, "{name}: {estimate:?}");
-}
-
-fn default_data() -> Vec<Scenario> {
-    let generator = GeneratorOptions { recordings: 24, ..GeneratorOptions::default() };
-    mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap().scenarios
 }
 
 /// The benchmark's case that is in the book, at seeds of which the search finds one of both kernels, or both.
@@ -127,7 +114,7 @@ fn the_book_s_own_case_is_held_whichever_kernel_the_search_finds() {
     let truth = 1.289e-5;
     for seed in [102, 1, 7] {
         let goal = Goal { half_width: 0.4, max_draws: 100_000, max_crude: 10_000_000 };
-        let estimate = adaptive_estimate(&density, &profile, ModelId::Fsm, 2.2, &goal, seed);
+        let estimate = adaptive_estimate(&density, &profile, (ModelId::Fsm, 2.2), &goal, seed);
         assert!(estimate.interval.holds(truth), "seed {seed}: {estimate:?}");
         assert_eq!(estimate.trust.draws(), Verdict::Sound, "seed {seed}: {estimate:?}");
     }
@@ -135,7 +122,7 @@ fn the_book_s_own_case_is_held_whichever_kernel_the_search_finds() {
 
 #[test]
 fn importance_sampling_agrees_with_crude_monte_carlo_on_lanes() {
-    compare("default data", &default_data(), Category::CutIn, "1", 20_000_000);
+    compare("default data", scenarios(), Category::CutIn, "1", 20_000_000);
 }
 
 #[test]
@@ -144,7 +131,7 @@ fn its_interval_holds_what_a_hundred_million_lanes_resolve() {
     let mined =
         |dir: PathBuf| mine_folder(&dir, &MiningOptions::default(), Default::default(), || Ok(())).unwrap().scenarios;
     let samples = 100_000_000;
-    compare("default data", &default_data(), Category::CutIn, "2", samples);
+    compare("default data", scenarios(), Category::CutIn, "2", samples);
     if let Some(dir) = common::sumo_recordings() {
         compare("SUMO", &mined(dir), Category::Lvd, "i", samples);
     }

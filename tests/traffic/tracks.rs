@@ -243,7 +243,8 @@ fn the_preset_says_what_a_wrong_file_means() {
     corner.map("x", |v, row| v - 0.5 * number(row, length));
     corner.map("y", |v, row| v - 0.5 * number(row, width));
     front.map("x", |v, row| v + 0.5 * libm::cos(number(row, heading).to_radians()) * number(row, length));
-    let says: [(Plain, fn(&mut Preset)); 3] = [
+    type Change = fn(&mut Preset);
+    let says: [(Plain, Change); 3] = [
         (wrong, |preset| preset.axes.y = Side::Right),
         (corner, |preset| preset.reference = Reference::Corner),
         (front, |preset| preset.reference = Reference::Front),

@@ -1,6 +1,6 @@
 //! Every reader of the library: valid inputs for it, and what a program does with what it reads.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use lanesweep::engine::{Backend, CpuBackend, Headway, LanePlan, Partial, SampleTally, Wanted};
 use lanesweep::model::criterion::Criterion;
@@ -16,8 +16,8 @@ use lanesweep::stats::density::{DensityModel, Exposure, read_density};
 use lanesweep::stats::random::Stream;
 use lanesweep::support::plausibility::Implausible;
 use lanesweep::traffic::mining::{MiningOptions, mine, mine_folder};
-use lanesweep::traffic::trajectory::Inputs;
 use lanesweep::traffic::trajectory::tracks::{Preset, TrackFile, read_usable};
+use lanesweep::traffic::trajectory::{Inputs, Loaded};
 use lanesweep::{Error, Place, Result};
 
 use super::seeds::Seeds;
@@ -65,39 +65,37 @@ pub fn all(seeds: &Seeds) -> Vec<Reader> {
 /// Alone in a folder, detected by its content, with whatever it is doubted for.
 fn tracks_named(name: &str, bytes: &[u8], dir: &Path) -> Result<()> {
     let path = file(bytes, dir, name);
+    let mined = |loaded: &Loaded| drop(mine(&loaded.recording, &MiningOptions::default()));
     let read = Inputs::of(&path, None).and_then(|inputs| {
         let (files, _) = inputs.files();
-        files.iter().try_for_each(|file| {
-            file.read(Implausible::Accepted)?
-                .iter()
-                .for_each(|loaded| drop(mine(&loaded.recording, &MiningOptions::default())));
-            Ok(())
-        })
+        files.iter().try_for_each(|file| file.read(Implausible::Accepted).map(|all| all.iter().for_each(mined)))
     });
-    std::fs::remove_file(&path).expect("the temporary folder can be written to");
+    removed(&[path]);
     read
+}
+
+fn removed(paths: &[PathBuf]) {
+    paths.iter().for_each(|path| std::fs::remove_file(path).expect("the temporary folder can be written to"));
 }
 
 fn exid(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {
     let meta = file(b"recordingId,frameRate\n0,25\n", dir, "01_recordingMeta.csv");
     let read = tracks_named("01_tracks.csv", bytes, dir);
-    std::fs::remove_file(meta).expect("the temporary folder can be written to");
+    removed(&[meta]);
     read
 }
 
 fn preset(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
     let path = file(bytes, dir, "own.toml");
     let table = file(&seeds.files["track table"][0], dir, "own.csv");
-    let beside = [file(b"id,l\n1,4.5\n", dir, "own_meta.csv"), file(b"fps\n10\n", dir, "own_rec.csv")];
+    let [meta, rate] = [file(b"id,l\n1,4.5\n", dir, "own_meta.csv"), file(b"fps\n10\n", dir, "own_rec.csv")];
     let preset = Preset::load(&path.to_string_lossy())?;
     let read = read_usable(&TrackFile { path: table.clone(), id: "own".to_owned() }, &preset, Implausible::Accepted);
-    for path in beside.iter().chain([&table]) {
-        std::fs::remove_file(path).expect("the temporary folder can be written to");
-    }
+    removed(&[meta, rate, table]);
     read.map(drop)
 }
 
-fn file(bytes: &[u8], dir: &Path, name: &str) -> std::path::PathBuf {
+fn file(bytes: &[u8], dir: &Path, name: &str) -> PathBuf {
     let path = dir.join(name);
     std::fs::write(&path, bytes).expect("the temporary folder can be written to");
     path
@@ -237,13 +235,9 @@ fn journal(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {
     Ok(())
 }
 
-/// The units of the part that is made as a seed.
+/// The units of the parts that are made as seeds: of samples, of a study, of weighted sums.
 pub const PART_UNITS: std::ops::Range<u64> = 3..17;
-
-/// The units of the part of a study that is made as a seed.
 pub const STUDY_UNITS: std::ops::Range<u64> = 1..3;
-
-/// The units of the part of weighted sums that is made as a seed.
 pub const WEIGHTED_UNITS: std::ops::Range<u64> = 5..14;
 
 fn weighted_part(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {

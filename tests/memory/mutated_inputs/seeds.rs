@@ -74,12 +74,8 @@ fn track_table(header: &str, line: impl Fn(u32, u32, f64, f64) -> String) -> Vec
 fn track_tables() -> Vec<Vec<u8>> {
     vec![
         track_table("track_id,t,x,y,heading,speed,vx,vy,length,width,class,lane", |v, k, x, y| {
-            format!(
-                "{v},{:.1},{x:.2},{y:.2},0.0,30,30,0,4.5,1.8,{},{}",
-                0.1 * f64::from(k),
-                ["car", "truck"][v as usize % 2],
-                v % 2
-            )
+            let (t, class) = (0.1 * f64::from(k), ["car", "truck"][v as usize % 2]);
+            format!("{v},{t:.1},{x:.2},{y:.2},0.0,30,30,0,4.5,1.8,{class},{}", v % 2)
         }),
         track_table(
             "timestep_time;vehicle_id;vehicle_x;vehicle_y;vehicle_angle;vehicle_type;vehicle_speed;vehicle_lane;vehicle_length;vehicle_width",
