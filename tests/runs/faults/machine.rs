@@ -62,12 +62,12 @@ fn recordings_and_scenarios_that_do_not_fit_leave_nothing_that_looks_whole() {
     let bench = Bench::new();
     let dir = bench.path();
     let synth = "-q tracks --synth-recordings 2 --config generator.duration_s=20 --convert";
-    ran(dir, &format!("{synth} whole/synth"));
+    ran(dir, &format!("{synth} whole/tracks"));
     ran(dir, "-q tracks --convert recordings --synth-recordings 6");
     std::fs::create_dir_all(dir.join("whole/mine")).unwrap();
     ran(dir, "-q mine recordings --out whole/mine/s.jsonl");
     // The first recording fits, the second only to its half.
-    let size = |file: &str| std::fs::metadata(dir.join("whole/synth").join(file)).unwrap().len();
+    let size = |file: &str| std::fs::metadata(dir.join("whole/tracks").join(file)).unwrap().len();
     let half = format!("{}k", (size("01_tracks.csv") + size("02_tracks.csv") / 2) / 1024 + 32);
     for (name, line, size, file, cut_off) in [
         ("tracks", synth, &*half, "", "02_tracks.csv"),
