@@ -212,7 +212,9 @@ fn results<'a>(folder: &'a RunFolder, names: &[String]) -> Result<Results<'a>> {
     let to = folder.dir();
     // Files that a killed run was renaming are written anew.
     let unfinished = unfinished(to).unwrap_or_default();
-    let is_foreign = |file: &PathBuf| file.exists() && !unfinished.iter().any(|name| file.ends_with(name));
+    // Links are refused when they would be written.
+    let is_there = |file: &PathBuf| file.exists() && !file.is_symlink();
+    let is_foreign = |file: &PathBuf| is_there(file) && !unfinished.iter().any(|name| file.ends_with(name));
     let files = names.iter().flat_map(|id| InputFile::Highd(HighdFiles::named(to, id)).paths());
     if let Some(file) = files.into_iter().find(is_foreign) {
         let name = file.file_name().unwrap_or_default().to_string_lossy();
