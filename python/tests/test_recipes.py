@@ -157,6 +157,8 @@ def test_uncertain_shares_are_those_of_the_verb_that_they_replace() -> None:
     # Of one input alone the index is 1: nothing else can explain the answer. RBD-FAST of SALib has 0.94 here.
     alone = recipes.uncertain(CASE, {"gap_m": 3.0}).indices.row(0, named=True)
     assert alone["index"] > 0.99 - alone["half_width"] and alone["half_width"] < 0.02
+    few = recipes.uncertain(CASE | {"gap_m": 13.9}, {"gap_m": 3.0}, draws=100).indices.row(0, named=True)
+    assert 0.5 < few["index"] <= 1.0 and np.isfinite(few["half_width"])
     assert found.draws.height == 20_000 and found.draws["answer"].null_count() == 0
 
 

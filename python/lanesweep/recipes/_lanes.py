@@ -89,7 +89,7 @@ def delta_v(
 
     ΔV = (1 + e)·m_other/(m_own + m_other)·closing speed, of a central contact in line: null for a contact from the side, for one of
     vehicles that overlapped along the road by more than a time step's way before, and for one in which they move apart. `rows` are those
-    of `simulate` or `sample`; `dt_s` is the longest time step of their profile.
+    of `simulate` or `sample`; `dt_s` is the time step of their profile: 0.1 of `jrc-2021`.
     """
     with extra():
         import polars as pl

@@ -88,9 +88,10 @@ def _shares(what: str, names: list[str], counts: list[int], of: int) -> pl.DataF
 
 
 def _indices(inputs: pl.DataFrame, seed: int) -> pl.DataFrame:
-    """First-order indices of "the answer is that of the case without errors": its variance between bins of a hundredth of the draws.
+    """First-order indices of "the answer is that of the case without errors": its variance between bins of the draws.
 
-    The correlation ratio, corrected for the number of bins (Kelley's epsilon squared), with the interval of 200 bootstrap samples.
+    There are a hundred bins, or fewer of ten draws each. The index is the correlation ratio, corrected for the number of bins (Kelley's
+    epsilon squared); its interval comes from 200 bootstrap samples.
     """
     with extra():
         import polars as pl
@@ -99,12 +100,13 @@ def _indices(inputs: pl.DataFrame, seed: int) -> pl.DataFrame:
     if min(is_own.sum(), count - is_own.sum()) < 30:
         # Too few draws have another answer, or this one.
         return pl.DataFrame({"input": names, "index": None, "half_width": None})
-    bins = {name: np.argsort(np.argsort(inputs[name].to_numpy())) * 100 // count for name in names}
+    parts = min(100, count // 10)
+    bins = {name: np.argsort(np.argsort(inputs[name].to_numpy())) * parts // count for name in names}
 
     def index(name: str, chosen: npt.NDArray[np.int64]) -> float:
         own, of = is_own[chosen], bins[name][chosen]
-        sizes, hits = np.bincount(of, minlength=100), np.bincount(of, own, minlength=100)
-        within = (hits - hits**2 / np.maximum(sizes, 1)).sum() / (count - 100)
+        sizes, hits = np.bincount(of, minlength=parts), np.bincount(of, own, minlength=parts)
+        within = (hits - hits**2 / np.maximum(sizes, 1)).sum() / (count - parts)
         return float(1.0 - within / own.var(ddof=1))
 
     generator = np.random.default_rng(seed)
