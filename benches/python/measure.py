@@ -95,11 +95,11 @@ def driver() -> None:
         import polars as pl
 
         ours, theirs = (pl.read_parquet(f"{folder}/{name}.parquet") for name in ("NumPy", "built-in"))
-        same = [column for column in ours.columns if column not in ("model", "robust", "t_react")]
+        same = [column for column in ours.columns if column not in ("model", "robust", "reaction_s")]
         differing = (ours.select(same).rows() != theirs.select(same).rows()) and sum(
             a != b for a, b in zip(ours.select(same).rows(), theirs.select(same).rows(), strict=True)
         )
-        steps = int(((theirs["t_end"] / 0.04).round() + 1).sum())
+        steps = int(((theirs["end_s"] / 0.04).round() + 1).sum())
     row("driver", "lanes", "lane-steps", "seconds of study with rows", "differing lanes")
     row("built-in", len(theirs), steps, round(seconds["built-in"], 2), 0)
     row("NumPy", len(ours), steps, round(seconds["NumPy"], 2), int(differing))

@@ -6,7 +6,7 @@
 #
 #     lanesweep study --rows lanes.parquet
 #     pip install -r docs/examples/requirements.txt
-#     python docs/examples/from_parquet_to_figure.py lanes.parquet figure.png --category cut_in --param 2
+#     python docs/examples/from_parquet_to_figure.py lanes.parquet figure.png --category cut_in --variant 2
 #
 # The cells (`# %%`) run one by one in editors that know them, or as a notebook (`jupytext`).
 
@@ -25,28 +25,28 @@ parser = argparse.ArgumentParser(description="Failures of S and S' by headway, a
 parser.add_argument("lanes", help="table of lanes (.parquet)")
 parser.add_argument("figure", help="file to write (.png, .svg, .pdf)")
 parser.add_argument("--category", default="cut_in", choices=["cut_in", "cut_out", "lvd"])
-parser.add_argument("--param", default="2", help="key of the parameterization")
+parser.add_argument("--variant", default="2", help="key of the parameterization")
 parser.add_argument("--criterion", default="collision", choices=["collision", "ttc", "btn"])
 parser.add_argument("--scenarios", type=int, default=18, help="scenarios to list")
 chosen = parser.parse_args()
 
 # %% Read: only the columns that are needed, and the unit of the axis
-schema = pq.read_schema(chosen.lanes)
 keys = pq.read_metadata(chosen.lanes).metadata
 about = {key.decode(): value.decode() for key, value in keys.items() if key.startswith(b"lanesweep.")}
-unit = {field.name: field.metadata[b"unit"].decode() for field in schema}
-columns = ["id", "param", "thw", "model", chosen.criterion, "robust"]
+columns = ["id", "variant", "headway", "model", chosen.criterion, "robust"]
 lanes = pd.read_parquet(chosen.lanes, columns=columns, filters=[("category", "==", chosen.category)])
+# "0.4s"; a gap or an observed headway has no place on the axis.
+lanes["thw"] = pd.to_numeric(lanes["headway"].astype(str).str.removesuffix("s"), errors="coerce")
 lanes = lanes[lanes["thw"].notna()].rename(columns={chosen.criterion: "failed"})
-keys = sorted(lanes["param"].unique())
-if chosen.param not in keys:
-    raise SystemExit(f"no lanes of {chosen.category} have the parameterization {chosen.param!r}: there are {keys}")
+keys = sorted(lanes["variant"].unique())
+if chosen.variant not in keys:
+    raise SystemExit(f"no lanes of {chosen.category} have the parameterization {chosen.variant!r}: there are {keys}")
 
 # %% S beside S': one row per scenario, headway and model
-beside = lanes[lanes["param"].isin(["S", chosen.param])].pivot(
-    index=["model", "thw", "id"], columns="param", values="failed"
+beside = lanes[lanes["variant"].isin(["S", chosen.variant])].pivot(
+    index=["model", "thw", "id"], columns="variant", values="failed"
 )
-beside = beside.rename(columns={"S": "s", chosen.param: "s_prime"}).dropna().astype(bool).reset_index()
+beside = beside.rename(columns={"S": "s", chosen.variant: "s_prime"}).dropna().astype(bool).reset_index()
 beside["change"] = beside["s_prime"].astype(int) - beside["s"].astype(int)  # -1: only S fails; +1: only S' fails
 models = [name for name in ["Reg157", "CCHDM", "RSS", "FSM"] if name in set(beside["model"])]
 models += sorted(set(beside["model"]) - set(models))
@@ -69,7 +69,7 @@ above, below = figure.subfigures(2, 1, height_ratios=[1, 1.25])
 panels = above.subplots(1, len(models), sharey=True, squeeze=False)[0]
 maps = below.subplots(1, len(models), sharey=True, squeeze=False)[0]
 count = beside["id"].nunique()
-label = f"S' ({chosen.param})"
+label = f"S' ({chosen.variant})"
 
 for panel, model in zip(panels, models):
     of_model = beside[beside["model"] == model].groupby("thw")
@@ -82,7 +82,7 @@ for panel, model in zip(panels, models):
         panel.fill_between(headways, 100 * low, 100 * high, color=colour, alpha=0.18, linewidth=0)
         panel.plot(headways, 100 * share, style, color=colour, marker=marker, markersize=3.5, label=name)
     panel.set_title(model, color=ink)
-    panel.set_xlabel(f"initial time headway ({unit['thw']})")
+    panel.set_xlabel(f"initial time headway (s)")
     panel.grid(axis="y", color="#dddddd", linewidth=0.6)
     panel.set_axisbelow(True)
     # The square root of the share: what happens in one case of a hundred is seen beside what happens in most.
@@ -109,7 +109,7 @@ for panel, model in zip(maps, models):
     missed = (changes[changes["model"] == model]["change"] == -1).sum()
     false = (changes[changes["model"] == model]["change"] == 1).sum()
     panel.set_title(f"{model}: {missed} missed, {false} false", color=ink)
-    panel.set_xlabel(f"initial time headway ({unit['thw']})")
+    panel.set_xlabel(f"initial time headway (s)")
 if listed:
     maps[0].invert_yaxis()
 below.legend(

@@ -21,15 +21,15 @@ def check(holds, what):
         sys.exit(f"read_tables: {what}")
 
 
-for table, sums in [("lanes", ["thw", "max_btn", "t_react", "impact_speed", "t_end", "crash_type"]),
+for table, sums in [("lanes", ["max_btn", "reaction_s", "impact_speed_mps", "end_s", "contact_type"]),
                     ("samples", ["sample", "min_ttc_s", "max_btn", "end_s", "v_target_mps"])]:
     path = str(folder / f"{table}.parquet")
-    csv = pd.read_csv(folder / f"{table}.csv", dtype={"param": str, "parameterization": str}, keep_default_na=True)
+    csv = pd.read_csv(folder / f"{table}.csv", dtype={"variant": str, "parameterization": str}, keep_default_na=True)
     frames = {
         "pandas": pd.read_parquet(path),
         "Polars": pl.read_parquet(path).to_pandas(),
         "DuckDB": duckdb.sql(f"select * from '{path}'").df(),
-        "JSON Lines": pd.read_json(folder / f"{table}.jsonl", lines=True, dtype={"param": str, "parameterization": str}),
+        "JSON Lines": pd.read_json(folder / f"{table}.jsonl", lines=True, dtype={"variant": str, "parameterization": str}),
     }
     for program, frame in frames.items():
         check(list(frame.columns) == list(csv.columns), f"{table}, {program}: columns {list(frame.columns)}")

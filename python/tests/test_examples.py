@@ -20,7 +20,7 @@ def test_an_autoencoder_goes_through_external_s_prime(scenarios: Path, tmp_path:
     with (tmp_path / "study" / "variants.csv").open(encoding="utf-8") as lines:
         rows = {row["variant"]: row for row in csv.DictReader(lines)}
     assert {"iii", "iii-cv", "autoencoder-3"} <= rows.keys()
-    assert 0 < float(rows["autoencoder-3"]["RMSE"]) < 1
+    assert 0 < float(rows["autoencoder-3"]["rmse"]) < 1
 
 
 def test_tables_are_external_s_prime_by_their_names(scenarios: Path, tmp_path: Path) -> None:
@@ -29,5 +29,5 @@ def test_tables_are_external_s_prime_by_their_names(scenarios: Path, tmp_path: P
     options = {"scenarios": scenarios, "categories": "lvd", "models": "FSM", "thw": 0.6}
     study = lanesweep.study(external={"same": frame}, **options)
     found = study.table("f1").to_pandas()
-    assert "same" in set(found["parameterization"]) and (found["data"] == "synthetic").all()
-    assert "external" in set(lanesweep.study(external=frame, **options).table("f1").to_pandas()["parameterization"])
+    assert "same" in set(found["variant"]) and (found["data"] == "synthetic").all()
+    assert "external" in set(lanesweep.study(external=frame, **options).table("f1").to_pandas()["variant"])

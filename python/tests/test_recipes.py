@@ -183,7 +183,7 @@ def test_a_justification_has_the_scores_and_intervals_of_the_study(study: tuple[
     lanes, f1 = study
     for criterion in ("collision", "ttc"):
         found = recipes.justification(lanes, key.removesuffix("-cv"), model="Reg157", criterion=criterion)
-        (of,) = f1.filter(parameterization=key, criterion=criterion).to_dicts()
+        (of,) = f1.filter(variant=key, criterion=criterion).to_dicts()
         scores = {row["quantity"]: row for row in found.scores.to_dicts()}
         assert scores["recall"]["parameterization"] == key
         for name, column in {"recall": "recall", "precision": "precision", "F1": "f1"}.items():
@@ -359,7 +359,7 @@ def test_a_description_without_emphasis_is_the_decomposition_of_the_study(scenar
     kept = pl.read_parquet(Path(mined)).filter(pl.col("kept"), category="lvd")
     ours = recipes.replayed(recipes.fit_description(kept, 3), kept)
     f1 = pl.DataFrame(lanesweep.study(scenarios=kept, categories="lvd", external={"ours": ours}).table("f1"))
-    counts = {key: f1.filter(parameterization=key).select("tp", "fn", "fp", "tn").rows() for key in ("iii", "ours")}
+    counts = {key: f1.filter(variant=key).select("tp", "fn", "fp", "tn").rows() for key in ("iii", "ours")}
     assert counts["ours"] == counts["iii"] and len(counts["iii"]) == 12
     emphasis, score = recipes.found_emphasis(kept, 3, evaluations=12)
     assert emphasis.shape == (5,) and 0.5 < score <= 1.0

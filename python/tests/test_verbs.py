@@ -88,7 +88,7 @@ def test_a_result_has_tables_figures_and_a_page(scenarios) -> None:
     result = lanesweep.study(scenarios=scenarios, thw="1.2,0.6", backend="cpu")
     frame = result.table("f1").to_pandas()
     assert set(frame["model"]) == {"Reg157", "CCHDM", "RSS", "FSM"}
-    assert frame["parameterization"].map(type).eq(str).all() and frame["tp"].dtype.kind == "i"
+    assert frame["variant"].map(type).eq(str).all() and frame["tp"].dtype.kind == "i"
     assert frame["f1"].dropna().between(0, 1).all()
     assert len(result.table("failures")) == len(result.table("failures").to_polars())
     headways = result.table("headways").to_arrow()

@@ -15,6 +15,8 @@ override frame_start_shift: bool;
 override frame_end_when_settled: bool;
 // s; off unless positive
 override frame_abort_above_ttc: f32;
+// Of two unsafe vehicles the one with the larger demand counts, not the nearer one.
+override frame_largest_demand: bool;
 // Position of the model in the registry.
 override frame_model: u32;
 // The sweep returns continuous values, not only verdicts.
@@ -102,6 +104,8 @@ struct Moment {
     is_unsafe: bool,
     // The second vehicle determines the reaction.
     second_decides: bool,
+    // Both are unsafe.
+    both_unsafe: bool,
     touching: bool,
     touching_second: bool,
     aborting: bool,
@@ -195,7 +199,8 @@ fn observe(state: LaneState, lane: LaneCase) -> Moment {
                 nearest = nearest_ttc(nearest, second);
             }
             let other_is_unsafe = attentive_check(second, lane.others[1], state.index);
-            // The nearest unsafe vehicle determines the reaction.
+            // Of two unsafe vehicles the nearer one determines the reaction, or (`advance`) the one that demands more.
+            moment.both_unsafe = moment.is_unsafe & other_is_unsafe;
             moment.second_decides = other_is_unsafe & (!moment.is_unsafe | (state.gap_1 < state.gap_0));
             moment.is_unsafe = moment.is_unsafe | other_is_unsafe;
             moment.touching_second = !moment.touching & is_touched(second, lane.others[1]);
@@ -248,7 +253,15 @@ fn advance(before: LaneState, moment: Moment, lane: LaneCase) -> LaneState {
         if scene_paired & moment.second_decides {
             view = moment.second.view;
         }
-        let reaction = react(before.driver, view);
+        var reaction = react(before.driver, view);
+        if scene_paired & frame_largest_demand & moment.both_unsafe {
+            // A driver brakes harder where the demand is larger, so the demands themselves are not compared.
+            reaction = react(before.driver, moment.first.view);
+            let other = react(before.driver, moment.second.view);
+            if other.state.deceleration > reaction.state.deceleration {
+                reaction = other;
+            }
+        }
         state.v_ego = reaction.v_next;
         state.driver = reaction.state;
     }

@@ -114,10 +114,11 @@ impl CheckedTable<'_> {
         let subjects: Vec<Subject> = subjects.collect();
         let mut verdicts = nominal_verdicts(&subjects, self.profile, executor)?.into_iter();
         let answers = rows.into_iter().map(|(row, of)| {
-            let (_, given) = of?;
+            let (subject, given) = of?;
             let missing = || Err(Error::Internal("a case has no verdict".to_owned()));
             let verdicts = given.located(verdicts.next().unwrap_or_else(missing))?;
-            Ok(CaseAnswer::nominal(row, given.id, &verdicts, self.models))
+            let drives_through_s = subject.drives_through_s(self.profile)?;
+            Ok(CaseAnswer::nominal((row, given.id), &verdicts, self.models, drives_through_s))
         });
         Ok(answers.collect())
     }

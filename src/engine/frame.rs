@@ -2,7 +2,7 @@
 //! one model.
 
 use crate::model::criterion::Criteria;
-use crate::model::profile::FrameProfile;
+use crate::model::profile::{CutOutTarget, FrameProfile};
 use crate::model::scalar::Real;
 
 use super::scene::Scene;
@@ -22,6 +22,8 @@ pub struct Frame<R> {
     pub end_when_settled: bool,
     /// Abort at lateral overlap with |TTC| above this, s (the JRC's rule for CCHDM); off unless positive.
     pub abort_above_ttc: R,
+    /// Of two unsafe vehicles the one with the larger demand counts, not the nearer one.
+    pub largest_demand: bool,
 }
 
 impl<R: Real> Frame<R> {
@@ -34,6 +36,7 @@ impl<R: Real> Frame<R> {
             start_shift: profile.start_shift,
             end_when_settled: profile.end_when_settled,
             abort_above_ttc: R::from_f64(abort_above_ttc_s),
+            largest_demand: profile.cut_out_target == CutOutTarget::LargestDemand,
         }
     }
 
@@ -46,6 +49,7 @@ impl<R: Real> Frame<R> {
             ("frame_start_shift", f64::from(u8::from(self.start_shift))),
             ("frame_end_when_settled", f64::from(u8::from(self.end_when_settled))),
             ("frame_abort_above_ttc", self.abort_above_ttc.to_f64()),
+            ("frame_largest_demand", f64::from(u8::from(self.largest_demand))),
         ]
     }
 }

@@ -210,11 +210,12 @@ pub(super) fn advance<R: Real, M: DriverModel<R>>(
         second = see(simulation, &ego, &lane.others[1], &places[1], gaps[1], index, runs);
         record = update_record(criteria, &record, &second);
         let other_hazard = check(simulation, &second, &lane.others[1], index);
-        // The nearest unsafe vehicle determines the reaction.
-        let nearer = other_hazard.is_unsafe & (!hazard.is_unsafe | gaps[1].is_below(gaps[0]));
+        // Of two unsafe vehicles the nearer one determines the reaction, or the one that demands more.
+        let (demand, other_demand) = (hazard.demand, other_hazard.demand);
+        let counts = if frame.largest_demand { demand.is_below(other_demand) } else { gaps[1].is_below(gaps[0]) };
         hazard = Hazard {
+            demand: (other_hazard.is_unsafe & (!hazard.is_unsafe | counts)).choose(other_demand, demand),
             is_unsafe: hazard.is_unsafe | other_hazard.is_unsafe,
-            demand: nearer.choose(other_hazard.demand, hazard.demand),
         };
         touched = touched | is_touched(scene, &second, &lane.others[1]);
         settled = settled & is_settled(scene, &second);

@@ -7,6 +7,7 @@ use super::lane_case::LaneCase;
 use super::lane_step::Seen;
 use super::outcome::{NO_STEP, Outcome};
 use super::plan::{Headway, LaneKey};
+use crate::model::criterion::Contact;
 use crate::model::driver::{ModelId, View};
 use crate::model::profile::Profile;
 use crate::model::scalar::Real;
@@ -185,6 +186,24 @@ impl Trace {
                 self.steps.iter().find(brakes).map(|step| step.step.saturating_sub(1))
             }
             StepMark::Contact => happened(self.outcome.contact_step),
+        }
+    }
+
+    /// Description of the contact. A vehicle that is beside the ego when it comes into its path hits its side, also where
+    /// its centre is ahead of the ego's.
+    pub fn contact_label(&self) -> &'static str {
+        let at = self.outcome.contact_step as usize;
+        let comes_beside = |pair: &[TracedStep]| {
+            let of = |other: usize| {
+                let [before, after] = [&pair[0], &pair[1]].map(|step| &step.others[other]);
+                before.lateral_gap_m >= 0.0 && before.gap_m < 0.0 && after.lateral_gap_m < 0.0 && after.gap_m < 0.0
+            };
+            (0..self.vehicles).any(of)
+        };
+        let pair = at.checked_sub(1).and_then(|before| self.steps.get(before..=at));
+        match self.outcome.contact {
+            Contact::Frontal if pair.is_some_and(comes_beside) => Contact::BySide.label(),
+            contact => contact.label(),
         }
     }
 

@@ -56,14 +56,21 @@ impl Case {
         let half_lengths_m = (self.principal.length_m + ahead.vehicle.length_m) / 2.0;
         let half_widths_m = (self.principal.width_m + ahead.vehicle.width_m) / 2.0;
         let mut apart_m = ahead.gap_m + half_lengths_m;
-        (0..profile.step_cap()).find_map(|step| {
+        for step in 0..profile.step_cap() {
             if step > 0 {
                 apart_m += (front.speed(&tables, step) - cutter.speed(&tables, step)) * dt_s;
             }
             let beside_m = cutter.lateral(&tables, step).position - front.lateral(&tables, step).position;
-            let overlaps = apart_m.abs() < half_lengths_m && beside_m.abs() < half_widths_m;
-            overlaps.then_some(f64::from(step) * dt_s)
-        })
+            let (time_s, is_beside) = (f64::from(step) * dt_s, beside_m.abs() >= half_widths_m);
+            if apart_m.abs() < half_lengths_m && !is_beside {
+                return Some(time_s);
+            }
+            // After its last event each stays where it is across the road.
+            if is_beside && time_s > self.horizon_s + dt_s {
+                break;
+            }
+        }
+        None
     }
 }
 

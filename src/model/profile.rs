@@ -22,6 +22,8 @@ pub const MAX_STEPS: f64 = 4e6;
 pub enum CutOutTarget {
     /// Both vehicles are checked at each step; the driver reacts to the nearest unsafe one.
     NearestUnsafe,
+    /// The same; of two unsafe vehicles the driver reacts to the one that demands the larger deceleration.
+    LargestDemand,
     /// No vehicle until the centre of the cutting-out vehicle is more than 0.375 m from the lane centre, then only the
     /// vehicle ahead. A cutting-out vehicle that hits it stops there and becomes the target (the JRC's simulator).
     Exposed,

@@ -2,16 +2,19 @@
 
 use super::case_sheet::CaseSheet;
 use crate::model::driver::ModelId;
-use crate::run::check::{Answer, Demand, Holds, Judged, Judgement, Verdict};
+use crate::run::check::{Answer, Demand, Holds, Judged, Judgement, Subject, Verdict};
 use crate::run::grid::VARIED;
-use crate::scenario::{CaseQuantity, Category, KMH};
-use crate::support::readable::value;
+use crate::scenario::{CaseQuantity, Category, KMH, SPEED_ERROR_MPS};
+use crate::support::readable::{exact, value};
+
+/// The clause of a leader that brakes.
+pub(super) const CLAUSE_OF_LEADERS: &str = "UN R157, 5.2.5.1 still holds, whatever the drivers of Annex 3 do: the system has \
+     to avoid a collision with a leader that brakes up to its full performance";
 
 impl CaseSheet<'_> {
     /// The case in one line, with the deciding reading: speeds along the road in km/h, other values in SI units.
     pub(super) fn case(&self) -> String {
         let point = self.subject.point();
-        let kmh = |name: &str, mps: f64| format!("{name} {} km/h", value(mps * KMH));
         let quantities = [
             (CaseQuantity::EgoSpeed, "ego"),
             (CaseQuantity::OtherSpeed, "other vehicle"),
@@ -25,15 +28,26 @@ impl CaseSheet<'_> {
         ];
         let parts = quantities.into_iter().filter_map(|(quantity, name)| {
             let si = point.get(quantity)?;
-            let number = quantity.number();
-            Some(match number.needs_unit() {
-                true => kmh(name, si),
-                false => format!("{name} {} {}", value(si), number.unit()),
+            Some(match quantity {
+                CaseQuantity::Deceleration if si < 0.0 => {
+                    format!("other vehicle's acceleration {}", self.number(quantity, -si))
+                }
+                _ => format!("{name} {}", self.number(quantity, si)),
             })
         });
         let first = self.first();
         let reading = format!("{} under {} ({})", self.subject.category().label(), first.profile, first.danger);
         format!("{reading}: {}", parts.collect::<Vec<_>>().join(", "))
+    }
+
+    /// A number of the case with its unit, so that it can be repeated from paper; a recorded one cannot.
+    pub(super) fn number(&self, quantity: CaseQuantity, si: f64) -> String {
+        let number = quantity.number();
+        let (unit, per_si) = if number.needs_unit() { ("km/h", KMH) } else { (number.unit(), 1.0) };
+        match self.subject {
+            Subject::Plain(..) => format!("{} {unit}", exact(si, per_si)),
+            Subject::Recorded(..) => format!("{} {unit}", value(si * per_si)),
+        }
     }
 
     /// The answer in one sentence; "robust" is used only if it holds for every verdict named, and says what varied.
@@ -89,10 +103,17 @@ impl CaseSheet<'_> {
         if !first.annex_flips.is_empty() {
             of_drivers.push(format!("the case leaves Annex 3 with {}", changes(&first.annex_flips)));
         }
+        if !first.reading_turns.is_empty() {
+            let names = names(&first.reading_turns);
+            of_drivers.push(format!("the verdict of {names} rests on a reading where Annex 3 is silent"));
+        }
         of_drivers.extend(touching(first));
-        of_drivers.extend(drives_through(first));
+        of_drivers.extend(drives_through(first.drives_through_s));
         let robustness = match (&first.flips[..], &of_drivers[..]) {
             _ if answer == Answer::Open => "longer runs are not computed".to_owned(),
+            ([], _) if first.reading_turns_answer => {
+                "no change listed below alters it, but another reading where Annex 3 is silent does".to_owned()
+            }
             ([], of_drivers) if first.rests_on_touching() => {
                 format!("the answer rests on it: {}", of_drivers.join("; "))
             }
@@ -145,9 +166,15 @@ impl CaseSheet<'_> {
 
     /// The clause of a leader that brakes, which names no driver.
     fn clause_of_leaders(&self) -> Option<String> {
-        let clause = "UN R157, 5.2.5.1 still holds, whatever the drivers of Annex 3 do: the system has to avoid a collision with a \
-                      leader that brakes up to its full performance (its conditions are not tested here)";
-        (self.subject.category() == Category::Lvd).then(|| clause.to_owned())
+        let brakes = match self.subject {
+            Subject::Plain(_, point) => point.get(CaseQuantity::Deceleration).is_some_and(|a| a > 0.0),
+            Subject::Recorded(scenario, _) => {
+                let v = &scenario.target.v;
+                v.iter().any(|later| later + SPEED_ERROR_MPS < v[0])
+            }
+        };
+        (self.subject.category() == Category::Lvd && brakes)
+            .then(|| format!("{CLAUSE_OF_LEADERS} (its conditions are not tested here)"))
     }
 
     fn demand_of_first(&self) -> Vec<String> {
@@ -201,8 +228,8 @@ pub(super) fn touching(judgement: &Judgement) -> Option<String> {
 }
 
 /// Why a case cannot be traffic.
-pub(super) fn drives_through(judgement: &Judgement) -> Option<String> {
-    let time_s = value(judgement.drives_through_s?);
+pub(super) fn drives_through(time_s: Option<f64>) -> Option<String> {
+    let time_s = value(time_s?);
     Some(format!("no such traffic: the vehicle that cuts out drives through the one ahead of it from {time_s} s on"))
 }
 
@@ -218,8 +245,11 @@ fn demand_of(judgement: &Judgement) -> Option<String> {
     let quantities = |holds: Holds| {
         let of_kind = judgement.conditions().filter(move |reading| reading.holds() == holds);
         of_kind.map(|reading| {
-            let is =
-                reading.value.map_or("does not happen".to_owned(), |v| format!("is {} {}", value(v), reading.unit));
+            let is = match (reading.value, reading.time_s) {
+                (Some(v), _) => format!("is {} {}", value(v), reading.unit),
+                (None, Some(_)) => "does not exist, because the other vehicle is behind the ego then".to_owned(),
+                (None, None) => "does not happen".to_owned(),
+            };
             let (sign, threshold) = (reading.relation.sign(), value(reading.threshold));
             format!("{} {is}; the clause applies where it is {sign} {threshold} {}", reading.quantity, reading.unit)
         })

@@ -22,11 +22,10 @@ use crate::support::table::{Column, NumberText, Table, json_number};
 const DRIVERS: &str = "Smallest gap to a vehicle in the ego's path, smallest TTC, largest BTN. At a contact while the gap \
      closes, TTC is 0 and BTN ∞ by definition. Touches: no contact, but the smallest gap is below 1 cm, or becomes so as the \
      time step goes to 0. None: there is nothing to avoid. Open: the gap still closes at the end of the run. Contact: side \
-     where the centre of the other vehicle lies behind that of the ego, else rear-end, also of a vehicle that moves sideways into \
-     the ego; closing is the ego's speed minus the other's. Times count from the start of the case. Brakes: the time from which the ego brakes; CCHDM's coasting is no braking. \
+     where the other vehicle hits the ego from behind or moves sideways into it, else rear-end; closing is the ego's speed minus the other's. Times count from the start of the case. Brakes: the time from which the ego brakes; CCHDM's coasting is no braking. \
      –: not before the end of the run; for TTC: the gap does not close. A row that equals that of a profile above is left out";
 /// What the columns of the boundaries show.
-const BOUNDARIES: &str = "One number is changed, all others stay, in 100 steps to either end of its range (JSON: searched). \
+const BOUNDARIES: &str = "One number is changed, all others stay, in 130 steps, fine near the case, to either end of its range (JSON: searched). \
      Changes at: the nearest values below and above, rounded to 4 digits, at which the computed answer is another one. The \
      answer may be undecided before that value. At least one change lies between the case and this value; a change that lasts \
      for less than a step of the scan is missed. –: no change found. The last columns: where each driver's collision changes";
@@ -68,11 +67,13 @@ impl CaseSheet<'_> {
         let mut list: Vec<(String, String)> = Vec::new();
         for number in &NUMBERS {
             let Some(si) = point.get(number.quantity) else { continue };
-            let text = match number.needs_unit() {
-                true => format!("{} km/h ({} m/s)", value(si * KMH), value(si)),
-                false => format!("{} {}", value(si), number.unit()),
-            };
-            list.push((number.label.to_owned(), text));
+            let is_gained = number.quantity == CaseQuantity::Deceleration && si < 0.0;
+            let label = if is_gained { "Acceleration of the other vehicle" } else { number.label };
+            let mut text = self.number(number.quantity, if is_gained { -si } else { si });
+            if number.needs_unit() {
+                text += &format!(" ({} m/s)", value(si));
+            }
+            list.push((label.to_owned(), text));
         }
         if let Some(duration_s) = self.subject.duration_s() {
             list.push(("Duration of the motions".to_owned(), format!("{} s", value(duration_s))));
@@ -91,7 +92,7 @@ impl CaseSheet<'_> {
     fn drivers(&self) -> Table {
         let judged =
             self.judgements.iter().flat_map(|judgement| judgement.models.iter().map(move |of| (judgement, of)));
-        let contact = |judged: &Judged| judged.trace.outcome.contact.label().split(' ').next();
+        let contact = |judged: &Judged| judged.trace.contact_label().split(' ').next();
         let table = Table::of(judged)
             .column("profile", |(judgement, _)| judgement.profile.as_str())
             .column("model", |(_, judged)| judged.trace.model.name())

@@ -7,13 +7,15 @@ use serde_json::json;
 
 use super::case_sentences::{drives_through, past_the_cap, touching};
 use super::case_sheet::{CaseSheet, verdict_of};
+use super::lanes::{outcome_cells, outcome_columns};
 use super::records::{self, PROGRAM};
 use super::tables::wrap;
 use crate::Result;
+use crate::engine::Trace;
 use crate::model::driver::ModelId;
-use crate::run::check::{Answer, CaseVerdicts, Demand, Judgement, RunEnd, Verdict};
+use crate::run::check::{Answer, CaseVerdicts, Demand, Judged, Judgement, RunEnd, Verdict};
 use crate::support::readable::counted;
-use crate::support::table::{Column, Table, TableMetadata, TableOf};
+use crate::support::table::{Cell, Column, ColumnKind, Table, TableMetadata, TableOf};
 
 /// All verdicts, the worst first: those without a driver of Annex 3 that avoids the collision, then those with one, then
 /// those without a collision.
@@ -49,7 +51,11 @@ pub struct CaseAnswer {
     collisions: Vec<(&'static str, &'static str)>,
     /// The only reference driver that avoids the collision.
     rests_on: &'static str,
+    /// No vehicle drives through another one.
+    is_traffic: bool,
     note: String,
+    /// How the lane of each model ended; empty for nominal answers.
+    numbers: Vec<(Column, Cell<'static>)>,
 }
 
 impl CaseAnswer {
@@ -73,17 +79,24 @@ impl CaseAnswer {
             },
             collisions: models.map(|judged| (judged.trace.model.name(), verdict_of(judgement, judged))).collect(),
             rests_on: rests_on(judgement.verdict(), &judgement.verdicts),
+            is_traffic: judgement.drives_through_s.is_none(),
             note: once(note(judgement))
                 .chain(sheet.silent())
-                .chain(drives_through(judgement))
+                .chain(drives_through(judgement.drives_through_s))
                 .filter(|text| !text.is_empty())
                 .collect::<Vec<_>>()
                 .join(". "),
+            numbers: judgement.models.iter().flat_map(numbers).collect(),
         }
     }
 
     /// The computed answer of a row, without perturbations and clauses.
-    pub fn nominal(row: usize, id: Option<String>, verdicts: &CaseVerdicts, models: &[ModelId]) -> CaseAnswer {
+    pub fn nominal(
+        (row, id): (usize, Option<String>),
+        verdicts: &CaseVerdicts,
+        models: &[ModelId],
+        drives_through_s: Option<f64>,
+    ) -> CaseAnswer {
         let collision = |model: ModelId| match (verdicts.collides(model), verdicts.unreacting) {
             (true, _) => "COLLIDES",
             (false, RunEnd::Contact) => "avoids",
@@ -100,7 +113,9 @@ impl CaseAnswer {
             demanded: "",
             collisions: models.iter().map(|model| (model.name(), collision(*model))).collect(),
             rests_on: rests_on(verdicts.verdict(), verdicts),
-            note: String::new(),
+            is_traffic: drives_through_s.is_none(),
+            note: drives_through(drives_through_s).unwrap_or_default(),
+            numbers: Vec::new(),
         }
     }
 
@@ -108,6 +123,15 @@ impl CaseAnswer {
     pub fn id(&self) -> Option<&str> {
         self.id.as_deref()
     }
+}
+
+/// The columns of `simulate`, with the model's name before, and the time of braking.
+fn numbers(judged: &Judged) -> Vec<(Column, Cell<'static>)> {
+    let Trace { outcome, dt_s, model, .. } = &judged.trace;
+    let braking = Column::new("braking_s", ColumnKind::Binary64, "s", "When the driver first braked; null if never.");
+    let cells = outcome_cells(outcome, *dt_s).into_iter().chain([Cell::number(judged.braking_s())]);
+    let named = |column: Column| Column { name: format!("{}_{}", model.name(), column.name).into(), ..column };
+    outcome_columns(ColumnKind::Binary64).chain([braking]).map(named).zip(cells).collect()
 }
 
 fn rests_on(verdict: Verdict, verdicts: &CaseVerdicts) -> &'static str {
@@ -159,31 +183,56 @@ impl CaseAnswers {
         WORST_FIRST.into_iter().find(has).unwrap_or(Verdict::Answer(Answer::NoConflict))
     }
 
-    fn count(&self, verdict: Verdict) -> usize {
-        self.cases.iter().filter(|case| case.verdict == verdict).count()
+    /// Cases with an answer, of those with possible traffic or of the others.
+    fn count(&self, verdict: Verdict, is_traffic: bool) -> usize {
+        self.cases.iter().filter(|case| case.verdict == verdict && case.is_traffic == is_traffic).count()
     }
 
     /// How many cases have which answer.
+    fn counts(&self, is_traffic: bool) -> String {
+        let counts = WORST_FIRST.map(|verdict| (verdict, self.count(verdict, is_traffic)));
+        let some = counts.iter().filter(|(_, count)| *count > 0);
+        some.map(|(verdict, count)| format!("{count} {}", verdict.label())).collect::<Vec<_>>().join(", ")
+    }
+
+    fn not_traffic(&self) -> usize {
+        self.cases.iter().filter(|case| !case.is_traffic).count()
+    }
+
+    /// The cases without possible traffic; empty if there are none.
+    fn no_traffic(&self) -> String {
+        match self.not_traffic() {
+            0 => String::new(),
+            count => format!(
+                "No such traffic in {count} of {}: the vehicle that cuts out drives through the one ahead of it. Above they \
+                 are not counted ({}).",
+                counted(self.cases.len(), "case"),
+                self.counts(false)
+            ),
+        }
+    }
+
     fn summary(&self) -> String {
-        let counts = WORST_FIRST.iter().map(|verdict| (verdict, self.count(*verdict))).filter(|(_, count)| *count > 0);
-        let counts: Vec<String> = counts.map(|(verdict, count)| format!("{count} {}", verdict.label())).collect();
+        let counts = self.counts(true);
         let broken = match self.broken.len() {
             0 => String::new(),
             count => format!("; {} cannot be judged", counted(count, "row")),
         };
-        format!("{} under {}: {}{broken}", counted(self.cases.len(), "case"), self.profile, counts.join(", "))
+        let cases = counted(self.cases.len() - self.not_traffic(), "case");
+        let possible = if self.not_traffic() > 0 { " of possible traffic" } else { "" };
+        format!("{cases}{possible} under {}: {counts}{broken}", self.profile)
     }
 
     /// How many preventable cases only one reference driver avoids; empty if none.
     fn rests_on(&self) -> String {
-        let count = |name: &str| self.cases.iter().filter(|case| case.rests_on == name).count();
+        let count = |name: &str| self.cases.iter().filter(|case| case.rests_on == name && case.is_traffic).count();
         let counts = ModelId::ALL.map(|model| (model.name(), count(model.name())));
         let alone: Vec<String> =
             counts.iter().filter(|(_, count)| *count > 0).map(|(name, count)| format!("{count} ({name})")).collect();
         if alone.is_empty() {
             return String::new();
         }
-        let all = self.count(Verdict::Answer(Answer::Preventable));
+        let all = self.count(Verdict::Answer(Answer::Preventable), true);
         format!("Of {} called preventable, one driver alone decides in {}.", counted(all, "case"), alone.join(", "))
     }
 
@@ -220,12 +269,18 @@ impl CaseAnswers {
 
     /// All columns of all rows.
     fn all(&self) -> Table {
-        self.columns(self.cases.iter().collect())
+        let mut table = self
+            .columns(self.cases.iter().collect())
             .column("case", |case| case.case.as_str())
             .column("answer", |case| case.answer.as_str())
             .column("demand", |case| case.demand.join(". "))
             .column("rests_on", |case| case.rests_on)
-            .build()
+            .build();
+        table.columns.extend(self.cases[0].numbers.iter().map(|(column, _)| column.clone()));
+        for (row, case) in table.rows.iter_mut().zip(&self.cases) {
+            row.extend(case.numbers.iter().map(|(_, cell)| cell.clone()));
+        }
+        table
     }
 
     /// Writes the rows as a table: CSV, JSON Lines or Parquet, by the ending of the name.
@@ -240,7 +295,8 @@ impl CaseAnswers {
 
     /// The table as text.
     pub fn text(&self, width: usize) -> String {
-        let notes = [LEGENDS[usize::from(self.is_nominal)], &self.left_out(), &self.rests_on()].map(str::to_owned);
+        let legend = LEGENDS[usize::from(self.is_nominal)].to_owned();
+        let notes = [self.no_traffic(), legend, self.left_out(), self.rests_on()];
         let notes: Vec<String> = notes.into_iter().filter(|note| !note.is_empty()).collect();
         let rows = self.columns(self.shown()).build().text();
         format!("{}\n{rows}{}\n", self.summary(), wrap(&notes.join(" "), width))
@@ -251,13 +307,17 @@ impl CaseAnswers {
     /// # Errors
     /// None for a table of this program.
     pub fn json(&self) -> Result<String> {
-        let counts = WORST_FIRST.map(|verdict| (verdict.label().to_owned(), json!(self.count(verdict))));
+        let counts = |is_traffic| {
+            let counts = WORST_FIRST.map(|of| (of.label().to_owned(), json!(self.count(of, is_traffic))));
+            serde_json::Map::from_iter(counts)
+        };
         records::document(&json!({
             "program": PROGRAM,
             "data": self.origin,
             "profile": self.profile,
             "verdict": self.worst().label(),
-            "counts": serde_json::Map::from_iter(counts),
+            "counts": counts(true),
+            "no_such_traffic": counts(false),
             "nominal": self.is_nominal,
             "cases": self.all().records(),
             "cannot_be_judged": self.broken,

@@ -1,5 +1,4 @@
-//! One row per lane: verdicts, continuous values and times. Lanes of a study have the columns of the golden lanes;
-//! lanes of a sampling run have their point. Void samples have no row.
+//! One row per lane: verdicts, continuous values and times. Lanes of a sampling run have their point. Void samples have no row.
 
 use std::path::Path;
 
@@ -64,33 +63,14 @@ pub fn columns(value: ColumnKind) -> Vec<Column> {
     let mut columns = vec![
         c("id", ColumnKind::Text, "", "Scenario."),
         c("category", ColumnKind::Name, "", "Kind of scenario: cut_in, cut_out or lvd (leader decelerates)."),
-        c("param", ColumnKind::Name, "", "Variant: S (as recorded) or the key of a parameterization."),
-        c("thw", ColumnKind::Binary64, "s", "Initial time headway; null where the start is a gap."),
+        c("variant", ColumnKind::Name, "", "S (as recorded) or the key of a parameterization."),
+        c("headway", ColumnKind::Name, "", "Initial time headway or gap with its unit; `observed` where each case has its own."),
         c("model", ColumnKind::Name, "", "Driver model."),
     ];
-    columns.extend(ends_of_lanes().map(|(name, (_, kind, unit, meaning, _))| {
-        let kind = if *kind == ColumnKind::Binary32 { value } else { *kind };
-        Column::new(name, kind, *unit, *meaning)
-    }));
+    columns.extend(outcome_columns(value));
     let robust = "Moving the initial gap by 1e-9 m changes neither verdict nor contact in binary64; null for drivers outside the registry.";
-    columns.insert(ROBUST, c("robust", ColumnKind::Flag, "", robust));
+    columns.push(c("robust", ColumnKind::Flag, "", robust));
     columns
-}
-
-/// How a lane of a study ended: names as in golden lanes, and those of [`OUTCOME`].
-#[rustfmt::skip] // pairs
-const ENDS: [[&str; 2]; 15] = [
-    ["collision", "collision"], ["ttc", "ttc"], ["btn", "btn"], ["min_ttc", "min_ttc_s"], ["max_btn", "max_btn"],
-    ["crash_type", "contact_type"], ["t_react", "reaction_s"], ["t_crash", "contact_s"], ["impact_speed", "impact_speed_mps"],
-    ["t_end", "end_s"], ["min_thw", "min_thw_s"], ["max_drac", "max_drac_mps2"], ["tet", "tet_s"], ["tit", "tit_s2"],
-    ["pet", "pet_s"],
-];
-
-/// Place of the column that has no counterpart in [`OUTCOME`].
-const ROBUST: usize = 15;
-
-fn ends_of_lanes() -> impl Iterator<Item = (&'static str, &'static OutcomeColumn)> {
-    ENDS.into_iter().filter_map(|[name, of]| Some((name, OUTCOME.iter().find(|column| column.0 == of)?)))
 }
 
 /// Writes the lanes of a chunk with outcomes, in the plan's order. Null: did not happen. `robust` is false if moving
@@ -101,25 +81,19 @@ fn ends_of_lanes() -> impl Iterator<Item = (&'static str, &'static OutcomeColumn
 pub fn write_study_chunk(table: &mut TableWriter, plan: &LanePlan, chunk: &Chunk) -> Result<()> {
     let dt = plan.profile.frame.dt_s;
     let robust = robust_lanes(plan, chunk);
-    let ends: Vec<OutcomeValue> = ends_of_lanes().map(|(_, column)| column.4).collect();
     for (at, outcome) in chunk.outcomes.iter().enumerate() {
         let Some(key) = plan.key(chunk.first_lane + at as u64) else { continue };
         let block = &plan.blocks[key.block];
-        let thw = match plan.headways[key.headway] {
-            // 2 is written as `2.0`, like in the golden lanes.
-            Headway::ThwS(thw) => Cell::Decimal(thw),
-            Headway::GapM(_) | Headway::MinFollowing | Headway::Observed => Cell::Null,
-        };
         let id = block.units.name(key.unit);
         let mut row = vec![
             Cell::text(id.as_ref()),
             Cell::text(block.category.key()),
             Cell::text(block.variants[key.variant].as_str()),
-            thw,
+            Cell::text(plan.headways[key.headway].to_string()),
             Cell::text(plan.models[key.model].name()),
         ];
-        row.extend(ends.iter().map(|end| end(outcome, dt)));
-        row.insert(ROBUST, robust[at].map_or(Cell::Null, Cell::Flag));
+        row.extend(outcome_cells(outcome, dt));
+        row.push(robust[at].map_or(Cell::Null, Cell::Flag));
         table.row(&row)?;
     }
     Ok(())
@@ -150,11 +124,14 @@ static OUTCOME: [OutcomeColumn; 18] = [
 type OutcomeColumn = (&'static str, ColumnKind, &'static str, &'static str, OutcomeValue);
 type OutcomeValue = fn(&Outcome<f64>, f64) -> Cell<'static>;
 
-fn outcome_columns() -> impl Iterator<Item = Column> {
-    OUTCOME.iter().map(|&(name, kind, unit, meaning, _)| Column::new(name, kind, unit, meaning))
+/// `value` is the arithmetic of the numbers.
+pub(super) fn outcome_columns(value: ColumnKind) -> impl Iterator<Item = Column> {
+    OUTCOME.iter().map(move |&(name, kind, unit, meaning, _)| {
+        Column::new(name, if kind == ColumnKind::Binary32 { value } else { kind }, unit, meaning)
+    })
 }
 
-fn outcome_cells(outcome: &Outcome<f64>, dt_s: f64) -> [Cell<'static>; 18] {
+pub(super) fn outcome_cells(outcome: &Outcome<f64>, dt_s: f64) -> [Cell<'static>; 18] {
     std::array::from_fn(|at| OUTCOME[at].4(outcome, dt_s))
 }
 
@@ -173,7 +150,7 @@ pub fn case_columns() -> Vec<Column> {
         c("headway", ColumnKind::Name, "", "Initial time headway or gap with its unit; null where each case has its own."),
         c("model", ColumnKind::Name, "", "Driver model."),
     ];
-    columns.extend(outcome_columns());
+    columns.extend(outcome_columns(ColumnKind::Binary32));
     columns
 }
 
@@ -196,7 +173,7 @@ fn sampled_columns(density: &DensityModel) -> Vec<Column> {
         c("headway", ColumnKind::Name, "", "Initial time headway or gap with its unit; `sampled` where it is a parameter."),
         c("model", ColumnKind::Name, "", "Driver model."),
     ];
-    columns.extend(outcome_columns());
+    columns.extend(outcome_columns(ColumnKind::Binary32));
     columns.extend(density.space.parameters().iter().map(|parameter| {
         let (name, unit) = (parameter.name.clone(), parameter.unit.clone());
         Column::new(name, ColumnKind::Binary32, unit, "Parameter that was drawn.".to_owned())

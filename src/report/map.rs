@@ -89,7 +89,7 @@ impl MapReport {
             CellOutcome::Pass | CellOutcome::Fail => true,
             CellOutcome::NoConflict => self.criterion == Criterion::Collision,
             CellOutcome::Undecided if self.is_robust() => true,
-            CellOutcome::Undecided | CellOutcome::FailByReaction => {
+            CellOutcome::Undecided | CellOutcome::FailByReaction | CellOutcome::NoTraffic => {
                 self.grids.iter().any(|MappedGrid { map, .. }| {
                     (0..map.models.len()).any(|at| map.outcomes(at, self.criterion)[*outcome as usize] > 0)
                 })
@@ -98,7 +98,7 @@ impl MapReport {
         CellOutcome::ALL.into_iter().filter(is_shown).collect()
     }
 
-    /// Cells in which all reference drivers and an ego that never reacts collide. `None` unless these drivers were swept
+    /// Cells with possible traffic in which all reference drivers and an ego that never reacts collide. `None` unless these drivers were swept
     /// and collisions are mapped.
     fn not_preventable(&self, mapped: &MappedGrid) -> Option<Vec<bool>> {
         let MappedGrid { map, .. } = mapped;
@@ -107,7 +107,7 @@ impl MapReport {
         let at: Vec<usize> = at.collect::<Option<Vec<_>>>().filter(|at| !at.is_empty())?;
         let fails =
             |model, cell| map.verdicts(model, cell).failed(Criterion::Collision) && map.is_conflict(model, cell);
-        let all_fail = |cell| at.iter().all(|model| fails(*model, cell));
+        let all_fail = |cell| !map.drives_through(cell) && at.iter().all(|model| fails(*model, cell));
         (self.criterion == Criterion::Collision).then(|| (0..map.cell_count()).map(all_fail).collect())
     }
 

@@ -45,13 +45,13 @@ impl MapReport {
         let (grid, map) = (&mapped.plan.grid, &mapped.map);
         let axis = |axis: &'a GridAxis| record! { parameter: axis.parameter.key, values: &axis.values };
         let shares = map.models.iter().enumerate().map(|(at, model)| {
-            let failed = map.failures(at, self.criterion);
             let counts = map.outcomes(at, self.criterion);
             let outcomes = shown.iter().map(|outcome| (outcome.label(), counts[*outcome as usize]));
             record! {
                 model: model.name(),
-                failures: failed,
-                share: failed as f64 / map.cell_count() as f64,
+                failures: map.failures(at, self.criterion),
+                // Of the cells with possible traffic.
+                share: map.share(at, self.criterion),
                 // Cells by outcome (no conflict, pass, fail, …), for the outcomes that tables and legends count.
                 outcomes: outcomes.collect::<BTreeMap<_, _>>(),
                 known_percent: mapped.known_percent[at],
@@ -78,7 +78,7 @@ impl MapReport {
             native_gap: grid.has_native_gap(),
             cells: map.cell_count(),
             // Cut-outs: cells in which the vehicle that cuts out drives through the one ahead of it.
-            drives_through: mapped.drives_through.iter().filter(|drives| **drives).count(),
+            drives_through: map.cell_count() - map.possible_cells(),
             // Whether the grid was chosen to match a known fraction.
             chosen_to_match: mapped.is_chosen_to_match,
             shares: shares.collect::<Vec<_>>(),

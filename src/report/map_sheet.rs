@@ -40,6 +40,7 @@ fn colour(outcome: CellOutcome) -> &'static str {
         CellOutcome::Fail => "#4a6fa5",
         CellOutcome::FailByReaction => "#14203c",
         CellOutcome::Undecided => "#e69f00",
+        CellOutcome::NoTraffic => "#8a8a8a",
     }
 }
 
@@ -113,7 +114,7 @@ impl MapSheet<'_> {
             let kind = |i: usize, j: usize| usize::from(cells[self.grid.cell(panel, i, j)]);
             let lines = boundary(self.grid, &kind).into_iter().map(|(a, b)| vec![at(a), at(b)]);
             let count = cells.iter().filter(|is_not_preventable| **is_not_preventable).count();
-            let (word, all) = (Answer::NotPreventable.label(), cells.len());
+            let (word, all) = (Answer::NotPreventable.label(), self.possible_cells());
             Rule {
                 runs: lines.collect(),
                 name: format!("around what is {word}, CCHDM and FSM both collide: {count} of {all}"),
@@ -140,10 +141,15 @@ impl MapSheet<'_> {
     fn key(&self) -> Vec<(String, &'static str)> {
         let named = |outcome: &CellOutcome| {
             let count = self.cells.iter().filter(|of| *of == outcome).count();
-            let name = outcome.label();
-            (count > 0).then(|| (format!("{name}: {count} of {}", self.cells.len()), colour(*outcome)))
+            let (name, is_possible) = (outcome.label(), *outcome != CellOutcome::NoTraffic);
+            let all = if is_possible { self.possible_cells() } else { self.cells.len() };
+            (count > 0).then(|| (format!("{name}: {count} of {all}"), colour(*outcome)))
         };
         self.outcomes.iter().filter_map(named).collect()
+    }
+
+    fn possible_cells(&self) -> usize {
+        self.cells.iter().filter(|outcome| **outcome != CellOutcome::NoTraffic).count()
     }
 
     /// `ego 90 km/h`.

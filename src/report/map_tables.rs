@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 
+use super::case_sentences::CLAUSE_OF_LEADERS;
 use super::map::MapReport;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
@@ -18,9 +19,7 @@ impl MapReport {
         let outcomes = self.shown_outcomes();
         let known = Column::from("known %").digits(Digits::Fixed(1)).null("-");
         let rows = self.grids.iter().flat_map(|mapped| (0..mapped.map.models.len()).map(move |at| (mapped, at)));
-        let percent = |(mapped, at): (&MappedGrid, usize)| {
-            100.0 * mapped.map.failures(at, self.criterion) as f64 / mapped.map.cell_count() as f64
-        };
+        let percent = |(mapped, at): (&MappedGrid, usize)| 100.0 * mapped.map.share(at, self.criterion);
         let difference = |(mapped, at): (&MappedGrid, usize)| {
             let mark = if mapped.is_chosen_to_match { "*" } else { "" };
             Some(NumberText(format!("{:+.2}{mark}", percent((mapped, at)) - mapped.known_percent[at]?)))
@@ -76,11 +75,15 @@ impl MapReport {
                 "Fail by reaction: the driver reacts and collides; without a reaction nothing collides.\n"
             }
             CellOutcome::Undecided => &undecided,
+            CellOutcome::NoTraffic => {
+                "No such traffic: the vehicle that cuts out drives through the one ahead of it. No share counts these cells.\n"
+            }
             CellOutcome::Pass | CellOutcome::Fail => "",
         };
         let of_all = match self.criterion {
             Criterion::Collision => {
-                "Share: cells with a collision (fail and fail by reaction), of all cells, those without a conflict included.\n"
+                "Share: cells with a collision (fail and fail by reaction), of all cells with possible traffic, those without a conflict \
+                 included.\n"
             }
             Criterion::Ttc | Criterion::Btn => "",
         };
@@ -91,17 +94,14 @@ impl MapReport {
     /// Sentences on cells whose case is not what a reader would take it for.
     pub(super) fn cautions(&self) -> Vec<String> {
         let mut all = Vec::new();
-        for MappedGrid { plan, map, drives_through, .. } in &self.grids {
-            let count = drives_through.iter().filter(|drives| **drives).count();
-            if count > 0 {
-                all.push(format!(
-                    "No such traffic in {count} of {} cells of {}: the vehicle that cuts out drives through the one ahead of it.\n",
-                    map.cell_count(),
-                    plan.grid.name()
-                ));
-            }
+        for MappedGrid { plan, map, .. } in &self.grids {
             let brakes = (0..plan.grid.cell_count())
                 .any(|cell| plan.grid.point(cell).get(CaseQuantity::Deceleration).is_some_and(|a| a != 0.0));
+            let of_leaders = format!("{CLAUSE_OF_LEADERS}.\n");
+            let is_lvd = plan.grid.category() == Category::Lvd && !self.profile.reg157.clause.is_empty();
+            if brakes && is_lvd && !all.contains(&of_leaders) {
+                all.push(of_leaders);
+            }
             let is_clause = plan.grid.category() == Category::CutIn && !self.profile.reg157.clause.is_empty();
             if brakes && is_clause && map.models.contains(&ModelId::Reg157) {
                 all.push(format!(
@@ -124,10 +124,10 @@ impl MapReport {
         let grid = self.grids.first().map(|mapped| mapped.plan.grid.values(0)).unwrap_or_default();
         let keys: Vec<&str> = grid.iter().map(|(parameter, _)| parameter.key).collect();
         writeln!(out, "map,{},{columns}{}", keys.join(","), if is_robust { ",undecided" } else { "" })?;
-        for MappedGrid { plan, map, drives_through, .. } in &self.grids {
+        for MappedGrid { plan, map, .. } in &self.grids {
             let profile = &plan.parts[0].plan.profile;
-            for (cell, drives_through) in drives_through.iter().enumerate() {
-                let drives_through = u8::from(*drives_through);
+            for cell in 0..map.cell_count() {
+                let drives_through = u8::from(map.drives_through(cell));
                 let values: Vec<String> = plan.grid.values(cell).iter().map(|(_, value)| value.to_string()).collect();
                 let place = format!("{},{}", plan.grid.name(), values.join(","));
                 for (at, &model) in map.models.iter().enumerate() {

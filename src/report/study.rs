@@ -72,15 +72,17 @@ impl<'a> StudyReport<'a> {
             });
         let rows: Vec<(&CategoryScores, usize, f64)> = rows.collect();
         let three = |name: String| Column::from(name).digits(Digits::Fixed(3)).null("-");
+        let data = if self.facts().synthetic { "synthetic" } else { "recorded" };
         let table = Table::of(rows.iter())
-            .column("scenario", |(scores, ..)| scores.category.label())
+            .column("category", |(scores, ..)| scores.category.key())
             .column("variant", |(scores, variant, _)| scores.variants[*variant].as_str())
-            .column(three("RMSE".to_owned()), |(.., rmse)| *rmse)
+            .column(three("rmse".to_owned()), |(.., rmse)| *rmse)
             .columns(
                 Criterion::ALL,
-                |criterion| three(format!("mean F1, {}", criterion.label())),
+                |criterion| three(format!("f1_{}", criterion.key())),
                 |(scores, variant, _), criterion| scores.mean_f1(*variant, criterion),
             )
+            .column("data", |_| data)
             .build()
             .captioned(
                 "Cross-validation and given S': error of the motions in standard deviations, and F1 over the models",

@@ -150,7 +150,7 @@ pub(super) fn f1_records(scores: &ScoreTable, data: &str) -> Table {
     });
     Table::of(rows)
         .column("category", |(category, ..)| category.key())
-        .column("parameterization", |(_, name, _)| name)
+        .column("variant", |(_, name, _)| name)
         .column("parameters", |(category, name, _)| {
             Parameterization::find(category, name).map(|found| found.parameter_count())
         })

@@ -34,6 +34,13 @@ pub fn value(value: f64) -> String {
     }
 }
 
+/// Formats a number in a unit, of which so many are in one SI unit, with the fewest digits that give the same SI value back.
+pub fn exact(si: f64, per_si: f64) -> String {
+    let with = |digits: usize| format!("{:.digits$e}", si * per_si).parse().unwrap_or(f64::NAN);
+    let found = (0..17).map(with).find(|number: &f64| number / per_si == si);
+    found.unwrap_or(si * per_si).to_string()
+}
+
 /// Formats a number with a fixed number of significant digits, so that columns align: `0.450`, `36.0`. Below 0.001 and
 /// from 10⁹ it uses powers of ten.
 pub fn significant(value: f64, digits: usize) -> String {

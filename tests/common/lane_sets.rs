@@ -33,6 +33,9 @@ pub fn forms() -> Vec<Profile> {
     let mut exposed = paper.clone();
     exposed.frame.cut_out_target = CutOutTarget::Exposed;
     profiles.push(exposed);
+    let mut demanding = paper.clone();
+    demanding.frame.cut_out_target = CutOutTarget::LargestDemand;
+    profiles.push(demanding);
     let mut unsettled = paper.clone();
     unsettled.frame.end_when_settled = !paper.frame.end_when_settled;
     unsettled.frame.start_shift = !paper.frame.start_shift;

@@ -196,6 +196,65 @@ fn braking_on_a_gap_that_opened_begins_a_delay_after_the_reaction() {
     assert!((cchdm["braking_s"].as_f64().unwrap() - 3.132).abs() < 0.011, "{cchdm}");
 }
 
+/// FSM finds both vehicles unsafe from the start and brakes for the nearer one, which leaves; with the larger demand it stops.
+/// A driver that tests the TTC once sees no danger at 40 m: it is above 2 s then.
+#[test]
+fn what_another_reading_turns_is_named_and_not_called_robust() {
+    agree(
+        "
+        cut-out --ego-speed 130km/h --thw 2 --lateral-speed 1.1 --ahead-gap 70 = 1
+        + but another reading where Annex 3 is silent does
+        + of two unsafe vehicles the nearer one sets the demand
+        - robust: no change
+        cut-in 60 20 40 1 = 0
+        + the verdict of CCHDM rests on a reading
+        + Annex 3 is silent: CCHDM tests TTC ≤ 2 s until it holds, not once
+        - robust: no change
+        cut-in 60 20 30 1 = 0
+        + robust: no change
+        + CCHDM tests TTC once
+        - Rests on a reading
+        ",
+    );
+    let of = |case: &str, reading: &str, rule: &str| {
+        let rows = json(case)["by_rule"].clone();
+        let is_row = |row: &&Value| row["reading"] == reading && row["rule"] == rule;
+        rows.as_array().unwrap().iter().find(is_row).unwrap()["verdict"].clone()
+    };
+    let cut_out = "cut-out --ego-speed 130km/h --thw 2 --lateral-speed 1.1 --ahead-gap 60";
+    assert_eq!(of(cut_out, "frame.cut_out_target = largest-demand", "FSM alone"), "not preventable");
+    assert_eq!(of("cut-in 60 20 40 1", "CCHDM tests TTC once", "all"), "not preventable");
+}
+
+/// What stands on the sheet is the case: every digit, no deceleration that is none, 5.2.5.1 for leaders that brake.
+#[test]
+fn the_numbers_and_sentences_of_a_sheet_are_those_of_its_case() {
+    let hidden = "cut-in 78.112 70 0.5 0.761 --lane-width 4 --length 2.2 --width 0.8 --ego-length 4.9 --ego-width 1.9";
+    agree(
+        "
+        cut-in 130 0 143.949 1 = 8
+        + gap 143.949 m
+        + Initial gap: 143.949 m
+        + 130 km/h (36.11 m/s)
+        cut-in 60 55 10 1 --acceleration 1 --end-speed 60km/h = 9
+        + other vehicle's acceleration 1 m/s²
+        + Acceleration of the other vehicle: 1 m/s²
+        - eceleration -1
+        - eceleration of the other vehicle
+        lvd --ego-speed 60km/h --gap 40 --acceleration=0 = 9
+        - 5.2.5.1
+        ",
+    );
+    agree(&format!("{hidden} = 9\n+ (c) TTC at lane intrusion does not exist, because the other vehicle is behind"));
+    // A step of an even scan is 3 m: FSM collides from 0.52 to 2.54 m.
+    let gap = json(hidden)["profiles"][0]["boundaries"][0].clone();
+    assert_eq!(gap["collision_changes_at"]["FSM"]["above"], 0.52);
+    // A vehicle beside the ego moves into it; its centre is ahead.
+    let (_, out, _) = run("cut-in 60 59 0 1");
+    let row = out.lines().find(|line| line.contains("| FSM    | COLLIDES")).unwrap();
+    assert_eq!(row.split('|').nth(7).unwrap().trim(), "side", "{row}");
+}
+
 /// The columns of a contact: its kind, and the ego's speed minus the other's, with its sign.
 #[test]
 fn a_contact_has_its_kind_and_the_sign_of_its_closing_speed() {
@@ -422,7 +481,7 @@ fn the_verdict_by_rule_names_each_driver_and_the_rule_in_force_is_the_answer() {
     assert_eq!((alone.0.as_str(), alone.1, &all), ("not preventable", true, &alone), "{found}");
     assert_eq!(verdict("FSM alone").0, "preventable");
     let readings: Vec<&Value> = rows.iter().map(|row| &row["reading"]).filter(|reading| !reading.is_null()).collect();
-    assert!(readings.len() == 8 && readings.contains(&&"cchdm.coasting_mps2 = 0".into()), "{readings:?}");
+    assert!(readings.len() == 12 && readings.contains(&&"cchdm.coasting_mps2 = 0".into()), "{readings:?}");
     // The EU's profiles have no reference drivers.
     assert!(rows.iter().all(|row| !row["profile"].as_str().unwrap().starts_with("eu-")));
     let (_, out, _) = run(split);

@@ -174,6 +174,21 @@ fn a_table_is_judged_whole_and_its_status_is_that_of_the_worst_row() {
     assert!(code == 0 && out.contains("2 cases under un-r157: 2 preventable"), "{out} {error}");
 }
 
+/// The first vehicle that cuts out reaches the one ahead of it after 1.2 s, and needs 1.9 s to leave its path.
+#[test]
+fn a_cut_out_through_the_vehicle_ahead_is_no_traffic_and_counted_apart() {
+    let dir = tempfile::tempdir().unwrap();
+    let rows = "cut-out,60,1,20,1.5\ncut-out,60,1,60,1.5\n";
+    file(dir.path(), "cases.csv", &format!("category,ego_speed_kmh,lateral_speed,ahead_gap,thw\n{rows}"));
+    for check in ["check cases.csv", "check cases.csv --nominal"] {
+        let counts = document(dir.path(), check);
+        assert_eq!([&counts["counts"], &counts["no_such_traffic"]].map(|of| &of["preventable"]), [1, 1]);
+        let (_, out, _) = run(dir.path(), check);
+        assert!(out.starts_with("1 case of possible traffic under un-r157: 1 preventable\n"), "{out}");
+        assert!(out.contains("No such traffic in 1 of 2 cases: the vehicle that cuts out drives"), "{out}");
+    }
+}
+
 #[test]
 fn the_answers_of_a_table_go_to_a_table_in_the_order_of_the_file() {
     let dir = tempfile::tempdir().unwrap();
@@ -184,6 +199,16 @@ fn the_answers_of_a_table_go_to_a_table_in_the_order_of_the_file() {
     let answers = std::fs::read_to_string(dir.join("answers.csv")).unwrap();
     let verdicts: Vec<&str> = answers.lines().skip(1).map(|line| line.split(',').nth(2).unwrap()).collect();
     assert_eq!(verdicts, ["no conflict", "preventable", "not preventable", "no conflict"]);
+    // The numbers of every driver are those of `simulate`, and the time of braking that of the sheet.
+    let answers = document(dir, "check cases.csv");
+    let sheet = document(dir, "check cases.csv --row 2 --profiles un-r157");
+    let names = "min_gap_m min_ttc_s max_btn reaction_s braking_s contact_s impact_closing_speed_mps";
+    for model in sheet["profiles"][0]["models"].as_array().unwrap() {
+        for name in words(names) {
+            let key = format!("{}_{name}", model["model"].as_str().unwrap());
+            assert_eq!(answers["cases"][1][&key], model[name], "{key}");
+        }
+    }
     refused(dir, "check cases.csv --row 2 --rows answers.csv", 2, "--rows");
 }
 

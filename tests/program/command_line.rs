@@ -91,12 +91,13 @@ fn every_lane_of_the_study_can_be_written_and_one_of_them_rerun_by_its_key() {
     let dir = dir.path();
     ran(dir, &format!("-q study --scenarios {} --out result --rows lanes.csv", scenarios()));
     let ours = read(dir, "lanes.csv");
-    let golden = std::fs::read_to_string(common::golden("paper_sumo_01_02_lanes.csv")).unwrap();
-    let (columns, golden) = (ours.lines().next().unwrap(), golden.lines().next().unwrap());
-    assert_eq!(columns, format!("{golden},min_thw,max_drac,tet,tit,pet"), "the golden columns come first");
+    assert!(
+        ours.starts_with("id,category,variant,headway,model,collision,ttc,btn,"),
+        "the key and the verdicts come first"
+    );
     let line = ours.lines().nth(1).unwrap();
     let fields: Vec<&str> = line.split(',').collect();
-    let key = format!("{}/{}/{}s/{}", fields[0], fields[2], fields[3].trim_end_matches(".0"), fields[4]);
+    let key = format!("{}/{}/{}/{}", fields[0], fields[2], fields[3], fields[4]);
     let (code, said) = said(dir, &format!("simulate --scenarios {} --lane {key}", scenarios()));
     let verdict = if fields[5] == "1" { "Collision FAIL" } else { "Collision pass" };
     assert!(code == 0 && said.contains(verdict), "{line}: {said}");

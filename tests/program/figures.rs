@@ -98,7 +98,7 @@ fn a_mean_over_cells_is_that_of_the_scores_in_the_table() {
     let mut cells = std::collections::BTreeMap::<[String; 2], Vec<(String, Option<f64>)>>::new();
     for row in csv(&dir.path().join("f1.csv")) {
         let cell = cells.entry(["model", "criterion"].map(|name| row[name].clone())).or_default();
-        cell.push((row["parameterization"].clone(), row["f1"].parse().ok()));
+        cell.push((row["variant"].clone(), row["f1"].parse().ok()));
     }
     let shared: Vec<_> = cells.values().filter(|cell| cell.iter().all(|(_, f1)| f1.is_some())).collect();
     let mut means = csv(&dir.path().join("f1-by-parameters-cut-in.csv"));

@@ -17,8 +17,8 @@ fn s_prime_of_other_programs_and_of_bases_of_other_folds_are_scored() {
     let external = study.replace("--external", "--cross-validate --categories cut-in --out study --external");
     done(dir.path(), &[&words(&external)[..], &["my same.v2.jsonl"]].concat());
     let variants = std::fs::read_to_string(of("study/variants.csv")).unwrap();
-    let row = |name: &str| variants.lines().find(|line| line.starts_with(&format!("cut-in,{name},"))).unwrap();
-    assert_eq!(row("my-same-v2"), "cut-in,my-same-v2,0,1,1,1", "{variants}");
+    let row = |name: &str| variants.lines().find(|line| line.starts_with(&format!("cut_in,{name},"))).unwrap();
+    assert_eq!(row("my-same-v2"), "cut_in,my-same-v2,0,1,1,1,synthetic", "{variants}");
     row("5-cv");
     assert_eq!(std::fs::read_to_string(of("study/folds.csv")).unwrap().lines().next(), Some("scenario,fold"));
     #[cfg(feature = "parquet")]
@@ -26,7 +26,7 @@ fn s_prime_of_other_programs_and_of_bases_of_other_folds_are_scored() {
         ran(dir.path(), "-q mine recordings --out as-parquet.parquet");
         ran(dir.path(), &format!("{study} as-parquet.parquet --out parquet"));
         let variants = std::fs::read_to_string(of("parquet/variants.csv")).unwrap();
-        assert!(variants.contains("LVD,as-parquet,0,1,1,1"), "{variants}");
+        assert!(variants.contains("lvd,as-parquet,0,1,1,1"), "{variants}");
     }
     // What is wrong is said.
     let scenarios = read_scenario_file(&of("scenarios.jsonl"), Implausible::Refused).unwrap().scenarios;

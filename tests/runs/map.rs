@@ -492,7 +492,8 @@ fn a_cell_without_a_conflict_is_a_case_without_one() {
     assert!(compared.iter().all(|cases| *cases > 50), "{compared:?}");
 }
 
-/// Terminal, `map.json`, the sheet's legend and `cells.csv` count the same cells with the same words, for every preset.
+/// Terminal, `map.json`, the sheet's legend and `cells.csv` count the same cells with the same words, for every preset. Cells
+/// of cut-outs without possible traffic count in no share.
 #[test]
 fn tables_files_and_legends_of_a_map_count_the_same_cells() {
     let dir = tempfile::tempdir().unwrap();
@@ -513,6 +514,13 @@ fn tables_files_and_legends_of_a_map_count_the_same_cells() {
         let mut no_conflict = 0;
         for grid in record["grids"].as_array().unwrap() {
             let (name, all) = (grid["name"].as_str().unwrap(), grid["cells"].as_u64().unwrap());
+            let possible = all - grid["drives_through"].as_u64().unwrap();
+            let failures = grid["shares"].as_array().unwrap().iter().map(|share| share["failures"].as_u64().unwrap());
+            match name {
+                "cut_out_to_60" => assert_eq!((possible, failures.collect()), (1904, vec![0, 0])),
+                "cut_out_to_130" => assert_eq!((possible, failures.collect()), (1923, vec![104, 265])),
+                _ => assert_eq!(possible, all, "{what}"),
+            }
             for share in grid["shares"].as_array().unwrap() {
                 let model = share["model"].as_str().unwrap();
                 let svg = read(&format!("{name}_{}.svg", model.to_lowercase()));
@@ -526,7 +534,8 @@ fn tables_files_and_legends_of_a_map_count_the_same_cells() {
                         .iter()
                         .filter(|row| row["map"] == name && row["model"] == model && row["outcome"] == *word);
                     assert_eq!(in_file.count() as u64, count, "{what}, {name}, {model}: {word}");
-                    let drawn = svg.contains(&format!(">{word}: {count} of {all}<"));
+                    let of = if word == "no such traffic" { all } else { possible };
+                    let drawn = svg.contains(&format!(">{word}: {count} of {of}<"));
                     assert_eq!(drawn, count > 0, "{what}, {name}, {model}: {word}");
                     let at = words.iter().position(|other| other == word).expect(word);
                     assert_eq!(line[at].replace(',', ""), count.to_string(), "{what}, {name}, {model}: {word}");
@@ -534,6 +543,7 @@ fn tables_files_and_legends_of_a_map_count_the_same_cells() {
                     no_conflict += if word == "no conflict" { count } else { 0 };
                 }
                 assert_eq!(sum, all, "{what}, {name}, {model}");
+                assert_eq!(share["share"], share["failures"].as_u64().unwrap() as f64 / possible as f64);
                 // Dashes and their words are on the same sheets.
                 let words = svg.contains("around what is not preventable");
                 assert_eq!(words, svg.contains("class=\"not-preventable\""), "{what}, {name}, {model}");

@@ -38,7 +38,7 @@ fn rows(path: &Path) -> Vec<Row> {
 }
 
 fn key_of(row: &Row) -> String {
-    format!("{}/{}/{}s/{}", row["id"], row["param"], row["thw"], row["model"])
+    format!("{}/{}/{}/{}", row["id"], row["variant"], row["headway"], row["model"])
 }
 
 /// Reruns a lane by the program and compares with the study's row, every field.
@@ -63,26 +63,27 @@ fn compare_with_row(dir: &Path, from: &str, row: &Row, wide: bool) {
         let is_same = if wide { theirs == ours } else { theirs as f32 == ours as f32 };
         assert!(is_same, "{key}: {column} is {theirs}, rerun {ours}");
     };
-    same("min_ttc", &word("min_ttc_s"));
+    same("min_ttc_s", &word("min_ttc_s"));
     same("max_btn", &word("max_btn"));
-    same("t_end", &word("end_s"));
-    assert_eq!(row["t_react"].is_empty(), outcome["reaction_s"].is_null(), "{key}");
-    assert_eq!(row["t_react"].is_empty(), summary.contains("reacted: never"), "{key}: {summary}");
-    if !row["t_react"].is_empty() {
-        same("t_react", &word("reaction_s"));
+    same("end_s", &word("end_s"));
+    assert_eq!(row["reaction_s"].is_empty(), outcome["reaction_s"].is_null(), "{key}");
+    assert_eq!(row["reaction_s"].is_empty(), summary.contains("reacted: never"), "{key}: {summary}");
+    if !row["reaction_s"].is_empty() {
+        same("reaction_s", &word("reaction_s"));
     }
-    let contact = ["nothing", "side contact, closing at ", "rear-end contact, closing at "];
-    let contact = contact[row["crash_type"].parse::<usize>().unwrap()];
-    assert_eq!(row["crash_type"] == "0", !summary.contains("contact, closing at"), "{key}: {summary}");
-    if row["crash_type"] != "0" {
+    // A vehicle that moves sideways into the ego is a side contact of either type.
+    let contact = ["nothing", "side contact, closing at ", "contact, closing at "];
+    let contact = contact[row["contact_type"].parse::<usize>().unwrap()];
+    assert_eq!(row["contact_type"] == "0", !summary.contains("contact, closing at"), "{key}: {summary}");
+    if row["contact_type"] != "0" {
         assert!(summary.contains(contact), "{key}: {summary}");
-        assert_eq!(word("contact_type"), row["crash_type"]);
-        same("impact_speed", &word("impact_speed_mps"));
-        same("t_crash", &word("contact_s"));
+        assert_eq!(word("contact_type"), row["contact_type"]);
+        same("impact_speed_mps", &word("impact_speed_mps"));
+        same("contact_s", &word("contact_s"));
     }
     let last = series.lines().last().unwrap();
-    same("t_end", last.split(',').next().unwrap());
-    assert_eq!(last.ends_with("contact"), row["crash_type"] != "0", "{key}: {last}");
+    same("end_s", last.split(',').next().unwrap());
+    assert_eq!(last.ends_with("contact"), row["contact_type"] != "0", "{key}: {last}");
     assert_eq!(summary.contains("f64"), !wide, "what f64 gives is said beside f32: {summary}");
 }
 
@@ -132,7 +133,7 @@ fn lanes_run_again_by_the_program_are_the_rows_of_the_studys_table() {
     for index in 1000..1012 {
         compare_with_row(dir, "r", &table[drawn(index, table.len() as u64) as usize], false);
     }
-    compare_with_row(dir, "r", table.iter().find(|row| row["crash_type"] != "0").unwrap(), false);
+    compare_with_row(dir, "r", table.iter().find(|row| row["contact_type"] != "0").unwrap(), false);
 }
 
 #[test]
@@ -203,7 +204,7 @@ fn models_and_variants_stand_together_in_the_table_and_on_the_sheet() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     let table = study(dir, "--backend cpu --out r");
-    let row = table.iter().find(|row| row["category"] == "cut_in" && row["param"] == "2").unwrap();
+    let row = table.iter().find(|row| row["category"] == "cut_in" && row["variant"] == "2").unwrap();
     let simulate = format!("simulate --from r --lane {}", key_of(row));
     let of_lane = |flags: &str| ran(dir, &format!("{simulate} {flags}"));
     let lanes = |table: &str| {

@@ -240,7 +240,8 @@ fn lanes_of_a_study_and_of_a_sampling_run_are_those_of_simulate_in_binary32() {
     let mut reader = csv::Reader::from_path(root.join("lanes.csv")).unwrap();
     let rows = reader.deserialize::<HashMap<String, String>>().map(Result::unwrap);
     let colliding = rows.filter(|row| row["collision"] == "1");
-    let key = |row: HashMap<String, String>| format!("{}/{}/{}s/{}", row["id"], row["param"], row["thw"], row["model"]);
+    let key =
+        |row: HashMap<String, String>| format!("{}/{}/{}/{}", row["id"], row["variant"], row["headway"], row["model"]);
     let keys: Vec<String> = colliding.map(key).take(6).collect();
     let lanes: Vec<&str> = keys.iter().flat_map(|key| ["--lane", key]).collect();
     let check = |args: &[&str], from: &str| {

@@ -47,10 +47,10 @@ def justification(
     with extra():
         import polars as pl
     rows = table(lanes).filter(model=model)
-    known = rows["param"].cast(pl.String)
+    known = rows["variant"].cast(pl.String)
     variant = f"{parameterization}-cv" if (known == f"{parameterization}-cv").any() else parameterization
     recorded, replayed = rows.filter(known == "S"), rows.filter(known == variant)
-    both = recorded.join(replayed, on=["id", "thw"], suffix="_parameterized", validate="1:1", nulls_equal=True)
+    both = recorded.join(replayed, on=["id", "headway"], suffix="_parameterized", validate="1:1", nulls_equal=True)
     if both.is_empty():
         raise ValueError(f"the rows have no parameterization {variant} of {model}")
     one, other = pl.col(criterion), pl.col(f"{criterion}_parameterized")
@@ -63,7 +63,7 @@ def justification(
     inside = {name: _within(scores[name], ends) for name, ends in (limits or {}).items()}
     rows_of = [(name, variant, *value, inside.get(name)) for name, value in scores.items()]
     schema = {"quantity": pl.String, "parameterization": pl.String, "value": pl.Float64, "low": pl.Float64, "high": pl.Float64, "within": pl.String}
-    hidden = both.filter(one & ~other).sort("impact_speed", "min_ttc", descending=[True, False], nulls_last=True)
+    hidden = both.filter(one & ~other).sort("impact_speed_mps", "min_ttc_s", descending=[True, False], nulls_last=True)
     return Justification(pl.DataFrame(rows_of, schema, orient="row").fill_nan(None), hidden)
 
 

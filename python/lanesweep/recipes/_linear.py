@@ -136,7 +136,7 @@ def _scores(rows: pl.DataFrame, described: Mapping[str, pl.DataFrame], criterion
     with quiet():
         study = _verbs.study(scenarios=data, external=described, accept_implausible=True)
     judged = table(study.table("f1")).filter((pl.col("criterion") == criterion) & (pl.col("failing_scenarios") >= 10))
-    means = judged.group_by("parameterization").agg(pl.col("f1").fill_null(0.0).mean())
+    means = judged.group_by("variant").agg(pl.col("f1").fill_null(0.0).mean())
     by_name = dict(means.iter_rows())
     return [float(by_name[name]) for name in described]
 

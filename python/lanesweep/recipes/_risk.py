@@ -40,15 +40,14 @@ def failure_ratio(one: Any, other: Any, *, criterion: str = "collision", by: str
     with extra():
         import polars as pl
     first, second = (table(rows) for rows in (one, other))
-    headway = "headway" if by == "sample" else "thw"
     if any(rows["model"].n_unique() > 1 for rows in (first, second) if "model" in rows.columns):
         raise ValueError("a side has several drivers: filter its rows by model")
-    both = first.join(second, on=[by, headway], suffix="_other", validate="1:1", nulls_equal=True)
+    both = first.join(second, on=[by, "headway"], suffix="_other", validate="1:1", nulls_equal=True)
     if both.is_empty() or both.height < max(first.height, second.height):
         raise ValueError("the two have other cases: give one driver each, of one seed")
     found = []
-    for name, part in [("all", both), *((str(key[0]), of) for key, of in both.group_by(headway, maintain_order=True))]:
+    for name, part in [("all", both), *((str(key[0]), of) for key, of in both.group_by("headway", maintain_order=True))]:
         sums = part.group_by(by, maintain_order=True).agg(pl.col(criterion, f"{criterion}_other").cast(pl.Int64).sum(), runs=pl.len())
         above, below, runs = (sums[of].cast(pl.Int64).to_numpy() for of in (criterion, f"{criterion}_other", "runs"))
         found.append((name, *_clusters.ratio(above, below, runs, level)))
-    return pl.DataFrame(found, schema=[headway, "ratio", "low", "high"], orient="row", schema_overrides={headway: pl.String})
+    return pl.DataFrame(found, schema=["headway", "ratio", "low", "high"], orient="row", schema_overrides={"headway": pl.String})

@@ -12,7 +12,7 @@ pub(in crate::engine) struct Rules {
     pub scene: Scene,
     is_ratio: bool,
     sees_overlap: bool,
-    /// Rarely used rules share a loop that tests the lateral gate and the abort.
+    /// Rarely used rules share a loop that tests the lateral gate, the abort and which of two vehicles counts.
     is_seldom: bool,
     /// The sweep returns only verdicts: minima and maxima are not gathered.
     pub is_verdict_only: bool,
@@ -44,7 +44,7 @@ impl Rules {
             BtnForm::DistanceRatio => true,
             BtnForm::Exact => return None,
         };
-        let is_seldom = is_ratio || frame.abort_above_ttc > 0.0;
+        let is_seldom = is_ratio || frame.abort_above_ttc > 0.0 || frame.largest_demand;
         let sees_overlap = criteria.gate == LateralGate::Overlap && !is_seldom;
         let is_verdict_only = !values && !is_seldom;
         // Rarely used rules always test for contacts between two steps.
@@ -124,7 +124,8 @@ impl Rules {
             (false, true) => (LateralGate::Overlap, 0.0),
             (false, false) => (LateralGate::EgoWidth, 0.0),
         };
-        let frame = Frame { abort_above_ttc, ..*frame };
+        let largest_demand = self.is_seldom && frame.largest_demand;
+        let frame = Frame { abort_above_ttc, largest_demand, ..*frame };
         let (keeps_values, keeps_measures) = (!self.is_verdict_only, self.keeps_measures);
         (frame, Criteria { gate, keeps_values, keeps_measures, btn: criteria.btn.known_as(form), ..*criteria })
     }

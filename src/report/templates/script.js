@@ -36,7 +36,7 @@ document.addEventListener("mousemove", (event) => {
 const open = () => document.getElementById(location.hash.slice(1))?.querySelector("details")?.setAttribute("open", "");
 addEventListener("hashchange", open);
 open();
-// A part with figures prints, though not a whole folded section.
+// A part with figures prints, and a folded section with facts: hashes, program, command.
 addEventListener("beforeprint", () => {
-  document.querySelectorAll("details.part:has(figure)").forEach((part) => { part.open = true; });
+  document.querySelectorAll("details.part:has(figure), section > details:has(> dl)").forEach((part) => { part.open = true; });
 });

@@ -98,7 +98,7 @@ fn summary(lane: &TracedLane, is_one_of_many: bool) -> String {
         verdicts(outcome),
         time(outcome.reaction_step),
         time(outcome.end_step),
-        end(outcome),
+        end(outcome, trace.contact_label()),
         outcome.approach_ttc().map_or_else(|| "–".to_owned(), |ttc_s| format!("{} s", value(ttc_s))),
         value(outcome.max_btn),
         value(records::smallest_gap_m(outcome))
@@ -117,11 +117,11 @@ fn verdicts(outcome: &Outcome<f64>) -> String {
     Criterion::ALL.map(verdict).join(", ")
 }
 
-fn end(outcome: &Outcome<f64>) -> String {
+fn end(outcome: &Outcome<f64>, contact: &str) -> String {
     match outcome.end {
         EndReason::Contact => format!(
             "{}, closing at {} m/s, the ego at {} m/s",
-            outcome.contact.label(),
+            contact,
             value(outcome.impact_closing_speed),
             value(outcome.impact_speed)
         ),
@@ -143,7 +143,7 @@ fn differences(ours: &Outcome<f64>, reference: &Outcome<f64>, time: &dyn Fn(u32)
     }
     let how = |o: &Outcome<f64>| (o.end, o.end_step, o.contact, o.contact_with, o.contact_step);
     if how(ours) != how(reference) {
-        list.push(format!("end: {} ({})", time(reference.end_step), end(reference)));
+        list.push(format!("end: {} ({})", time(reference.end_step), end(reference, reference.contact.label())));
     }
     list
 }

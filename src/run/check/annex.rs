@@ -2,10 +2,12 @@
 //! describe, and our interpretations where the annex is silent. The last two exist only for a profile with the annex's
 //! rules.
 
+use std::borrow::Cow;
+
 use super::subject::{Lane, Subject};
 use crate::Result;
 use crate::model::driver::{BelowTrigger, CutInBraking, ModelId, NEVER};
-use crate::model::profile::Profile;
+use crate::model::profile::{CutOutTarget, Profile};
 use crate::run::grid::Point;
 use crate::scenario::{CaseQuantity, Category, SPEED_ERROR_MPS};
 use crate::support::readable::value;
@@ -72,6 +74,19 @@ pub(super) struct Reading {
     pub instead: &'static str,
     /// The profile with the other one.
     pub profile: Profile,
+    /// CCHDM tests the danger once, at the end of perception.
+    pub tests_once: bool,
+}
+
+/// The profile as a driver reads it in a lane: if CCHDM tests once and sees no danger then, it never brakes.
+pub(super) fn read_in<'p>(profile: &'p Profile, tests_once: bool, lane: &Lane, category: Category) -> Cow<'p, Profile> {
+    let attends_from = lane.case.others[0].attend_from[ModelId::Cchdm.index()];
+    if !tests_once || lane.run(profile, category, ModelId::Cchdm).outcome.reaction_step <= attends_from {
+        return Cow::Borrowed(profile);
+    }
+    let mut never = profile.clone();
+    never.cchdm.ttc_s = f64::from(f32::MIN_POSITIVE);
+    Cow::Owned(never)
 }
 
 /// Returns our interpretations where the annex is silent on the case.
@@ -85,7 +100,7 @@ pub(super) fn readings_where_silent(profile: &Profile, subject: &Subject) -> Res
         let mut other = profile.clone();
         change(&mut other);
         if other != *profile {
-            all.push(Reading { sentence, instead, profile: other });
+            all.push(Reading { sentence, instead, profile: other, tests_once: false });
         }
     };
     // `wandering_m` is the lateral deviation that the annex regards as normal. A profile without it does not follow the
@@ -100,6 +115,9 @@ pub(super) fn readings_where_silent(profile: &Profile, subject: &Subject) -> Res
             let brakes = format!("CCHDM brakes until the speeds are equal, not only while TTC ≤ {ttc_s} s (ours)");
             let instead = "cchdm.cut_in_braking = while-unsafe";
             other(brakes, instead, &|other| other.cchdm.cut_in_braking = CutInBraking::WhileUnsafe);
+            let sentence =
+                format!("CCHDM tests TTC ≤ {ttc_s} s until it holds, not once at the end of perception (ours)");
+            all.push(Reading { sentence, instead: "CCHDM tests TTC once", profile: profile.clone(), tests_once: true });
         }
         // A driver that ignores a softer leader and perceives this one: the annex is not silent on it.
         Category::Lvd if exceeds_trigger(profile, subject)? => {}
@@ -113,7 +131,12 @@ pub(super) fn readings_where_silent(profile: &Profile, subject: &Subject) -> Res
                 other(reacts.to_owned(), instead, &|other| other.cchdm.lvd_below_threshold = below);
             }
         }
-        Category::CutOut => {}
+        Category::CutOut => {
+            let nearer =
+                "of two unsafe vehicles the nearer one sets the demand, not the larger demand (ours)".to_owned();
+            let instead = "frame.cut_out_target = largest-demand";
+            other(nearer, instead, &|other| other.frame.cut_out_target = CutOutTarget::LargestDemand);
+        }
     }
     Ok(all)
 }

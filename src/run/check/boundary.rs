@@ -1,6 +1,7 @@
-//! Distance of a case from the boundary at which the answer changes: one number varies, all others stay. A scan of
-//! evenly spaced values finds the nearest change on either side; bisection then refines the value. At least one change
-//! lies between the case and that value. Two changes between neighbouring scan values are missed.
+//! Distance of a case from the boundary at which the answer changes: one number varies, all others stay. A scan, fine near
+//! the case, finds the nearest change on either side; bisection then refines the value, and its values count for the answer
+//! and for every driver. At least one change lies between the case and that value. Two changes between neighbouring values
+//! are missed.
 
 use super::subject::Subject;
 use super::{CaseVerdicts, StepBudget, Verdict};
@@ -9,8 +10,9 @@ use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::grid::{CaseQuantity, MapParameter, PARAMETERS};
 
-/// Number of scanned values on each side.
+/// Number of evenly spaced values on each side, and of values whose distances grow from the resolution on.
 const SCANNED: u32 = 100;
+const NEAR: u32 = 30;
 
 /// Varied quantities: name, minimum and maximum, resolution, all in the unit of the name.
 const VARIED: [(&str, f64, f64, f64); 8] = [
@@ -63,50 +65,59 @@ pub(super) fn boundaries(subject: &Subject, profile: &Profile, budget: &StepBudg
         let value = si * parameter.per_si;
         let verdicts = |value: f64| verdicts(subject, profile, parameter, value, budget);
         let side = |end: f64| -> Vec<(f64, CaseVerdicts)> {
-            let step = (end - value) / f64::from(SCANNED);
+            let range = end - value;
+            let step = range.abs() / f64::from(SCANNED);
+            let even = (0..=SCANNED).map(|k| step * f64::from(k));
+            let near = (0..NEAR).map(|k| resolution * libm::pow(step / resolution, f64::from(k) / f64::from(NEAR)));
+            let mut distances: Vec<f64> = even.chain(near.filter(|_| step > resolution)).collect();
+            distances.sort_by(f64::total_cmp);
             // The first value is that of the case; an invalid case ends the scan.
-            let values = (0..=SCANNED).map(|k| value + step * f64::from(k));
+            let values = distances.into_iter().map(|distance| value + distance.copysign(range));
             values.map_while(|value| Some((value, verdicts(value)?))).collect()
         };
-        let (below, above) = (side(min.min(value)), side(max.max(value)));
-        let answers = nearest(&below, &above, resolution, &verdicts, &CaseVerdicts::verdict);
-        let change = |model: &ModelId| {
-            let found = nearest(&below, &above, resolution, &verdicts, &|verdicts| verdicts.collides(*model));
-            change_of(&found)
-        };
+        let mut sides = [side(min.min(value)), side(max.max(value))];
+        let mut answers = [None, None];
+        let mut models = Vec::new();
+        // The values that one bisection adds are seen by the others in the second pass.
+        for _ in 0..2 {
+            answers = nearest(&mut sides, resolution, &verdicts, &CaseVerdicts::verdict);
+            let of_model = |model: &ModelId| {
+                change_of(&nearest(&mut sides, resolution, &verdicts, &|verdicts| verdicts.collides(*model)))
+            };
+            models = ModelId::ALL.iter().map(of_model).collect();
+        }
         found.push(Boundary {
             parameter,
             value,
             range: (min.min(value), max.max(value)),
             answer: change_of(&answers),
             becomes: answers.map(|found| found.map(|(_, answer)| answer)),
-            models: ModelId::ALL.iter().map(change).collect(),
+            models,
         });
         budget.check()?;
     }
     Ok(found)
 }
 
-/// The nearest values below and above at which a result changes, and the result there.
+/// The nearest values below and above at which a result changes, and the result there. The values of the bisection are added
+/// to the scanned ones.
 fn nearest<T: PartialEq>(
-    below: &[(f64, CaseVerdicts)],
-    above: &[(f64, CaseVerdicts)],
+    sides: &mut [Vec<(f64, CaseVerdicts)>; 2],
     resolution: f64,
     verdicts: &dyn Fn(f64) -> Option<CaseVerdicts>,
     of: &dyn Fn(&CaseVerdicts) -> T,
 ) -> [Option<(f64, T)>; 2] {
-    [below, above].map(|side| {
+    sides.each_mut().map(|side| {
         let case = of(&side.first()?.1);
-        let at = (1..side.len()).find(|&at| of(&side[at].1) != case)?;
-        let (mut same, mut other, mut is) = (side[at - 1].0, side[at].0, of(&side[at].1));
-        while (other - same).abs() > resolution {
-            let middle = (same + other) / 2.0;
-            match verdicts(middle).map(|verdicts| of(&verdicts)) {
-                Some(found) if found != case => (other, is) = (middle, found),
-                _ => same = middle,
-            }
+        let mut at = (1..side.len()).find(|&at| of(&side[at].1) != case)?;
+        while (side[at].0 - side[at - 1].0).abs() > resolution {
+            let middle = (side[at].0 + side[at - 1].0) / 2.0;
+            let Some(found) = verdicts(middle) else { break };
+            let is_same = of(&found) == case;
+            side.insert(at, (middle, found));
+            at += usize::from(is_same);
         }
-        Some(((other / resolution).round() * resolution, is))
+        Some(((side[at].0 / resolution).round() * resolution, of(&side[at].1)))
     })
 }
 

@@ -84,8 +84,13 @@ pub struct Judgement {
     pub outside_annex: Option<String>,
     /// Perturbations that change whether Annex 3 describes the case.
     pub annex_flips: Vec<&'static str>,
-    /// Interpretations where the regulation is silent whose alternative changes the answer or the verdict of CCHDM.
+    /// Interpretations where the regulation is silent whose alternative changes the answer or the verdict of a reference
+    /// driver.
     pub silent: Vec<String>,
+    /// Whether such an alternative changes the answer.
+    pub reading_turns_answer: bool,
+    /// The reference drivers whose verdict such an alternative changes.
+    pub reading_turns: Vec<ModelId>,
     /// The clauses applied to the case.
     pub readings: Vec<Reading>,
     /// Values of each parameter at which the answer changes.
@@ -262,7 +267,7 @@ impl Check {
         if traced > MAX_TRACED_STEPS {
             return Err(too_many_steps(profile));
         }
-        let changed = self.perturbed(profile, &budget)?;
+        let changed = self.perturbed(profile, false, &budget)?;
         let touching = self.touching(&changed, profile)?;
         let is_quiet = changed[0].verdicts.answer() == Answer::NoConflict;
         let opens = |changed: &&Changed| is_quiet && changed.verdicts.answer() == Answer::Open;
@@ -274,6 +279,10 @@ impl Check {
         });
         let unreacting = lane.unreacting(profile, self.subject.category());
         let attends_at_once = annex::attends_at_once(profile, self.subject.category(), &lane);
+        let (mut silent, turned) = self.silent(profile, &changed[0].verdicts, &budget)?;
+        silent.extend(attends_at_once.map(str::to_owned));
+        let is = &changed[0].verdicts;
+        let turns = |model: &&ModelId| turned.iter().any(|other| other.collides(**model) != is.collides(**model));
         Ok(Judgement {
             profile: profile.name.clone(),
             models: models.collect(),
@@ -286,7 +295,9 @@ impl Check {
             danger: annex::danger(profile, self.subject.category()),
             outside_annex: annex::outside(profile, self.subject.category(), self.subject.point()),
             annex_flips: flips(&changed, |changed| changed.verdicts.is_outside_annex),
-            silent: self.silent(profile, &changed[0].verdicts, attends_at_once, &budget)?,
+            silent,
+            reading_turns_answer: turned.iter().any(|other| other.answer() != is.answer()),
+            reading_turns: is.reference_drivers.iter().filter(turns).copied().collect(),
             readings: clauses::readings(
                 profile,
                 self.subject.category(),
@@ -307,7 +318,7 @@ impl Check {
             },
             touching,
             time_cap_s: profile.frame.time_cap_s,
-            drives_through_s: self.subject.case(profile, self.subject.point())?.drives_through_s(profile),
+            drives_through_s: self.subject.drives_through_s(profile)?,
         })
     }
 
@@ -324,46 +335,53 @@ impl Check {
         Ok(ModelId::ALL.into_iter().filter(touches).collect())
     }
 
-    /// Interpretations where the regulation is silent on which the answer depends.
+    /// Interpretations where the regulation is silent on which the answer depends, and the verdicts with the other ones.
     fn silent(
         &self,
         profile: &Profile,
         is: &CaseVerdicts,
-        attends_at_once: Option<&str>,
         budget: &StepBudget,
-    ) -> Result<Vec<String>> {
-        let category = self.subject.category();
-        let decides = |other: &Profile| -> Result<bool> {
-            budget.check()?;
-            let lane = self.subject.lane(other, self.subject.point())?;
-            let found = verdicts(&lane, self.subject.point(), other, category, budget);
-            Ok(found.answer() != is.answer() || found.collides(ModelId::Cchdm) != is.collides(ModelId::Cchdm))
-        };
-        let mut all = Vec::new();
+    ) -> Result<(Vec<String>, Vec<CaseVerdicts>)> {
+        let mut all: (Vec<String>, Vec<CaseVerdicts>) = Default::default();
         for other in annex::readings_where_silent(profile, &self.subject)? {
-            if !all.contains(&other.sentence) && decides(&other.profile)? {
-                all.push(other.sentence);
+            let found = self.changed("", &other.profile, self.subject.point(), other.tests_once, budget)?.verdicts;
+            let turns = |model: &ModelId| found.collides(*model) != is.collides(*model);
+            if found.answer() != is.answer() || is.reference_drivers.iter().any(turns) {
+                if !all.0.contains(&other.sentence) {
+                    all.0.push(other.sentence);
+                }
+                all.1.push(found);
             }
         }
-        all.extend(attends_at_once.map(str::to_owned));
         Ok(all)
     }
 
-    /// The verdicts of the case, then those of each perturbation.
-    fn perturbed(&self, profile: &Profile, budget: &StepBudget) -> Result<Vec<Changed>> {
+    /// The case with the numbers of a point.
+    fn changed(
+        &self,
+        by: &'static str,
+        profile: &Profile,
+        point: &Point,
+        tests_once: bool,
+        budget: &StepBudget,
+    ) -> Result<Changed> {
+        budget.check()?;
         let category = self.subject.category();
-        let changed = |by, profile: &Profile, point: &Point| -> Result<Changed> {
-            budget.check()?;
-            let lane = self.subject.lane(profile, point)?;
-            let verdicts = verdicts(&lane, point, profile, category, budget);
-            let readings = match category {
-                Category::CutIn => clauses::lane_intrusion(profile, &lane.unreacting(profile, category)),
-                Category::CutOut | Category::Lvd => Vec::new(),
-            };
-            Ok(Changed { by, verdicts, demand: clauses::demand(&readings) })
+        let lane = self.subject.lane(profile, point)?;
+        let profile = &*annex::read_in(profile, tests_once, &lane, category);
+        let verdicts = verdicts(&lane, point, profile, category, budget);
+        let readings = match category {
+            Category::CutIn => clauses::lane_intrusion(profile, &lane.unreacting(profile, category)),
+            Category::CutOut | Category::Lvd => Vec::new(),
         };
+        Ok(Changed { by, verdicts, demand: clauses::demand(&readings) })
+    }
+
+    /// The verdicts of the case, then those of each perturbation.
+    fn perturbed(&self, profile: &Profile, tests_once: bool, budget: &StepBudget) -> Result<Vec<Changed>> {
+        let changed = |by, profile: &Profile, point: &Point| self.changed(by, profile, point, tests_once, budget);
         let mut all = vec![changed("", profile, self.subject.point())?];
-        for perturbation in Perturbation::all(category) {
+        for perturbation in Perturbation::all(self.subject.category()) {
             let point = perturbation.of_point(*self.subject.point());
             all.push(changed(perturbation.label(), &perturbation.profile(profile)?, &point)?);
         }

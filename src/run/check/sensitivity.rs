@@ -41,7 +41,7 @@ impl Check {
         };
         let mut all = vec![rules(None, is, touching)];
         for other in annex::readings_where_silent(profile, &self.subject)? {
-            let changed = self.perturbed(&other.profile, budget)?;
+            let changed = self.perturbed(&other.profile, other.tests_once, budget)?;
             all.push(rules(Some(other.instead), &changed, &self.touching(&changed, &other.profile)?));
         }
         Ok(all)

@@ -138,6 +138,14 @@ impl Subject {
         }
     }
 
+    /// As [`Case::drives_through_s`].
+    ///
+    /// # Errors
+    /// As [`Subject::lane`].
+    pub fn drives_through_s(&self, profile: &Profile) -> Result<Option<f64>> {
+        Ok(self.case(profile, self.point())?.drives_through_s(profile))
+    }
+
     /// The case with the numbers of a point, ready to run.
     ///
     /// # Errors

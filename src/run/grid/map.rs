@@ -21,6 +21,8 @@ pub struct GridMap {
     unreacting: Vec<Vec<Verdicts>>,
     /// Lanes end once they are settled, so that one at the time cap still closes in.
     settles: bool,
+    /// Cut-outs: per cell, whether the vehicle that cuts out drives through the one ahead of it. Else empty.
+    pub(super) drives_through: Vec<bool>,
     /// Per model and criterion: the cells whose outcome a perturbation changes; empty if none was swept.
     undecided: Vec<[Vec<bool>; Criterion::ALL.len()]>,
 }
@@ -54,7 +56,8 @@ impl GridMap {
             summary.add(&swept);
         }
         let settles = plan.parts.iter().all(|part| part.plan.profile.frame.end_when_settled);
-        let map = GridMap { models: plan.models.clone(), verdicts, unreacting, settles, undecided: Vec::new() };
+        let (models, drives_through, undecided) = (plan.models.clone(), Vec::new(), Vec::new());
+        let map = GridMap { models, verdicts, unreacting, settles, drives_through, undecided };
         map.check_ends(plan)?;
         Ok((map, summary))
     }
@@ -100,6 +103,17 @@ impl GridMap {
         criterion == Criterion::Collision && is_open && !self.verdicts[model][cell].failed(criterion)
     }
 
+    /// Whether no traffic is as in the cell: the vehicle that cuts out drives through the one ahead of it. Shares and
+    /// boundaries are those of the other cells.
+    pub fn drives_through(&self, cell: usize) -> bool {
+        self.drives_through.get(cell).is_some_and(|drives| *drives)
+    }
+
+    /// Number of cells with possible traffic.
+    pub fn possible_cells(&self) -> usize {
+        (0..self.cell_count()).filter(|cell| !self.drives_through(*cell)).count()
+    }
+
     /// The outcome of a model's cell.
     pub fn outcome(&self, model: usize, cell: usize, criterion: Criterion) -> CellOutcome {
         let fails = self.verdicts[model][cell].failed(criterion);
@@ -107,6 +121,7 @@ impl GridMap {
         let is_conflict = criterion != Criterion::Collision || self.is_conflict(model, cell);
         let is_undecided = self.is_undecided(model, cell, criterion) || self.is_open(model, cell, criterion);
         match (is_undecided, is_conflict, fails) {
+            _ if self.drives_through(cell) => CellOutcome::NoTraffic,
             (true, ..) => CellOutcome::Undecided,
             (false, true, false) => CellOutcome::Pass,
             (false, true, true) => CellOutcome::Fail,
@@ -154,9 +169,15 @@ impl GridMap {
         self.verdicts[model][cell]
     }
 
-    /// Cells in which a model fails.
+    /// Cells with possible traffic in which a model fails.
     pub fn failures(&self, model: usize, criterion: Criterion) -> u64 {
-        self.verdicts[model].iter().filter(|v| v.failed(criterion)).count() as u64
+        let fails = |cell: &usize| self.verdicts[model][*cell].failed(criterion) && !self.drives_through(*cell);
+        (0..self.cell_count()).filter(fails).count() as u64
+    }
+
+    /// Fraction of the cells with possible traffic in which a model fails; NaN without such a cell.
+    pub fn share(&self, model: usize, criterion: Criterion) -> f64 {
+        self.failures(model, criterion) as f64 / self.possible_cells() as f64
     }
 }
 
@@ -236,16 +257,19 @@ pub enum CellOutcome {
     /// A perturbation changes the verdict, or whether there is a conflict; or the lane of an ego that never
     /// reacts ends at the time cap while the gap still closes.
     Undecided,
+    /// No traffic is as in this cell: [`GridMap::drives_through`].
+    NoTraffic,
 }
 
 impl CellOutcome {
     /// All, in the order of tables and legends.
-    pub const ALL: [CellOutcome; 5] = [
+    pub const ALL: [CellOutcome; 6] = [
         CellOutcome::NoConflict,
         CellOutcome::Pass,
         CellOutcome::Fail,
         CellOutcome::FailByReaction,
         CellOutcome::Undecided,
+        CellOutcome::NoTraffic,
     ];
 
     /// Text for tables, legends and files; the outcome without a conflict has the same word as on a sheet.
@@ -256,6 +280,7 @@ impl CellOutcome {
             CellOutcome::Fail => "fail",
             CellOutcome::FailByReaction => "fail by reaction",
             CellOutcome::Undecided => "undecided",
+            CellOutcome::NoTraffic => "no such traffic",
         }
     }
 }

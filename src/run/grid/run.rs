@@ -82,8 +82,6 @@ pub struct MappedGrid {
     pub known_percent: Vec<Option<f64>>,
     /// The grid was chosen to reproduce a published rate, so agreement confirms nothing.
     pub is_chosen_to_match: bool,
-    /// Cut-outs: per cell, whether the vehicle that cuts out drives through the one ahead of it.
-    pub drives_through: Vec<bool>,
 }
 
 /// Swept maps.
@@ -175,8 +173,8 @@ impl Map {
             for (by, plan) in perturbed {
                 map.mark_undecided(&sweep(&plan, if by.is_binary64() { &binary64 } else { executor })?);
             }
-            let drives_through = plan.drives_through()?;
-            grids.push(MappedGrid { plan, map, known_percent, is_chosen_to_match, drives_through });
+            map.drives_through = plan.drives_through()?;
+            grids.push(MappedGrid { plan, map, known_percent, is_chosen_to_match });
         }
         Ok(MapResult { grids, summary })
     }

@@ -97,7 +97,7 @@ fn append(kind: ColumnKind, builder: &mut Box<dyn ArrayBuilder>, cell: &Cell) ->
     let text = if let Cell::Text(text) = cell { Some(text) } else { None };
     let flag = if let Cell::Flag(flag) = cell { Some(*flag) } else { None };
     let whole = if let Cell::Whole(number) = cell { Some(*number) } else { None };
-    let number = if let Cell::Number(number) | Cell::Decimal(number) = cell { Some(*number) } else { None };
+    let number = if let Cell::Number(number) = cell { Some(*number) } else { None };
     match kind {
         ColumnKind::Text => typed::<StringBuilder>(builder)?.append_option(text),
         ColumnKind::Name => {

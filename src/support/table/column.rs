@@ -125,8 +125,6 @@ pub enum Cell<'a> {
     Whole(i64),
     /// For [`ColumnKind::Binary32`] (the value must fit) and [`ColumnKind::Binary64`].
     Number(f64),
-    /// As `Number`, but CSV writes 2 as `2.0`.
-    Decimal(f64),
     /// For [`ColumnKind::Series`].
     Series(Cow<'a, [f64]>),
     /// For [`ColumnKind::Wholes`].

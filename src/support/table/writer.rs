@@ -116,7 +116,7 @@ fn fits(kind: ColumnKind, cell: &Cell) -> bool {
         Cell::Text(_) => matches!(kind, ColumnKind::Text | ColumnKind::Name),
         Cell::Flag(_) => kind == ColumnKind::Flag,
         Cell::Whole(_) => kind == ColumnKind::Whole,
-        Cell::Number(_) | Cell::Decimal(_) => matches!(kind, ColumnKind::Binary32 | ColumnKind::Binary64),
+        Cell::Number(_) => matches!(kind, ColumnKind::Binary32 | ColumnKind::Binary64),
         Cell::Series(_) => kind == ColumnKind::Series,
         Cell::Wholes(_) => kind == ColumnKind::Wholes,
     }
@@ -141,7 +141,6 @@ pub(super) fn append_csv(text: &mut String, columns: &[Column], row: &[Cell]) {
             Cell::Whole(number) => write!(text, "{number}"),
             Cell::Number(number) if column.kind == ColumnKind::Binary32 => write!(text, "{}", *number as f32),
             Cell::Number(number) => write!(text, "{number}"),
-            Cell::Decimal(number) => write!(text, "{number:?}"),
             Cell::Series(series) => write!(text, "{}", joined(series)),
             Cell::Wholes(numbers) => write!(text, "{}", joined(numbers)),
         };
@@ -212,10 +211,10 @@ pub fn json_value(kind: ColumnKind, cell: &Cell) -> Value {
         Cell::Flag(flag) => Value::from(*flag),
         Cell::Whole(number) => Value::from(*number),
         // The shortest text that reads back to the same binary32.
-        Cell::Number(number) | Cell::Decimal(number) if kind == ColumnKind::Binary32 && number.is_finite() => {
+        Cell::Number(number) if kind == ColumnKind::Binary32 && number.is_finite() => {
             (*number as f32).to_string().parse::<f64>().map_or(Value::Null, Value::from)
         }
-        Cell::Number(number) | Cell::Decimal(number) => json_number(*number),
+        Cell::Number(number) => json_number(*number),
         Cell::Series(series) => Value::from(series.to_vec()),
         Cell::Wholes(numbers) => Value::from(numbers.to_vec()),
     }
