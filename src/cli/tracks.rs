@@ -65,6 +65,7 @@ impl Tracks {
             check_folder(out)?;
         }
         let (mut reports, mut recordings, mut is_complete) = (Vec::new(), Vec::new(), true);
+        let mut ids = BTreeSet::new();
         let is_kept = self.out.is_some() || self.convert.is_some();
         for path in &self.paths {
             let (files, problems) = Inputs::of(path, self.preset.as_deref())?.files();
@@ -74,7 +75,18 @@ impl Tracks {
                 // A bad file does not hide what is in the others.
                 let found = self.of_file(&file, configured).inspect_err(super::console::complain);
                 is_complete &= found.is_ok();
-                for (report, recording) in found.into_iter().flatten() {
+                for (mut report, mut recording) in found.into_iter().flatten() {
+                    let own = recording.id.clone();
+                    let mut number = 1;
+                    while !ids.insert(recording.id.clone()) {
+                        number += 1;
+                        recording.id = format!("{own}-{number}");
+                    }
+                    if number > 1 {
+                        let about = &mut report.understanding;
+                        about.warn(format!("another file has a recording {own} too: this one is {}", recording.id));
+                        about.recording.clone_from(&recording.id);
+                    }
                     is_complete &= report.understanding.is_usable();
                     reports.push(report);
                     recordings.extend(is_kept.then_some(recording));

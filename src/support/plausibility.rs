@@ -104,7 +104,10 @@ impl Quantity {
             false => (of.physical, "is beyond what is physical"),
         };
         let article = if of.name.starts_with('a') { "an" } else { "a" };
-        let hint = of.mistaken.iter().find(|(_, per_own)| contains(of.plausible, value / per_own));
+        // A wrong unit makes a number too large; a lorry that is overtaken is far behind.
+        let is_large =
+            |(_, per_own): &&(&str, f64)| value.abs() > of.plausible.1 && contains(of.plausible, value / per_own);
+        let hint = of.mistaken.iter().find(is_large);
         let hint = hint.map_or(String::new(), |(unit, per_own)| {
             format!(
                 "; {} looks like {unit}: {} {}",

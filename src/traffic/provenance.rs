@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use sha2::{Digest, Sha256};
 
-use super::mining::{Collection, MiningOptions, mine_generated, mine_inputs};
+use super::mining::{Collection, MiningOptions, leave_out_copies, mine_generated, mine_inputs};
 use super::trajectory::Inputs;
 use super::trajectory::generator::GeneratorOptions;
 use super::trajectory::highd::made_up;
@@ -69,17 +69,19 @@ impl Source {
         implausible: Implausible,
         done: impl Fn() -> Result<()> + Sync,
     ) -> Result<Collection> {
-        match self {
+        let mut collection = match self {
             Source::Scenarios(path) => {
                 let ScenarioFile { scenarios, problems, notes } = read_scenario_file(path, implausible)?;
                 let synthetic = scenarios.iter().any(|scenario| scenario.synthetic);
-                Ok(Collection { scenarios, problems, notes, synthetic, ..Collection::default() })
+                Collection { scenarios, problems, notes, synthetic, ..Collection::default() }
             }
             Source::Recordings { path, preset } => {
-                mine_inputs(Inputs::of(path, preset.as_deref())?, mining, implausible, done)
+                mine_inputs(Inputs::of(path, preset.as_deref())?, mining, implausible, done)?
             }
-            Source::Generated(options) => mine_generated(options, mining, done),
-        }
+            Source::Generated(options) => mine_generated(options, mining, done)?,
+        };
+        collection.notes.extend(leave_out_copies(&mut collection.scenarios));
+        Ok(collection)
     }
 
     /// The provenance of the scenarios loaded from here. If the user gives hours or kilometres (`given`), they replace all known

@@ -5,6 +5,7 @@ mod common;
 
 mod bad_geometry;
 mod bad_recordings;
+mod field_reports;
 mod foreign_encodings;
 mod foreign_tables;
 mod generator_calibration;

@@ -151,7 +151,8 @@ fn three_periods() -> Vec<String> {
         let is_lorry = vehicle.1 == "lorry" && (at != 4 || period == 1);
         let size = if is_lorry { "54.1,8.2,3" } else { "15.1,5.9,2" };
         let time_ms = 1_118_846_979_700 + 900_000 * period + 100 * frame as u64;
-        let (x, y, speed, lane) = (x / foot, -y / foot, vehicle.4 / foot, 3 - lane);
+        // No period is a copy of another.
+        let (x, y, speed, lane) = (x / foot + period as f64, -y / foot, vehicle.4 / foot, 3 - lane);
         format!("{},{},{time_ms},{y:.3},{x:.3},{size},{speed:.3},0,{lane},us-101", at + 1, frame + 1)
     };
     (0..3).flat_map(|period| samples(&CUT_IN, 14, 4.0).into_iter().map(move |of| row(period, of))).collect()

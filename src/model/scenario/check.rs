@@ -62,6 +62,10 @@ pub(super) fn check(scenario: &Scenario) -> std::result::Result<(), Problem> {
     }
     for (field, value) in [("thw0", s.thw0), ("gap0", s.gap0), ("D", s.lead_gap), ("peak_decel", s.peak_decel)] {
         value.map_or(Ok(()), |value| finite(field, value))?;
+        // The target of a cut-in may begin beside the ego.
+        let is_ahead = field == "D" || (field != "peak_decel" && s.category != Category::CutIn);
+        let (value, what) = (value.unwrap_or(0.0), "at least 0: a vehicle beside or behind is not ahead");
+        expect(!is_ahead || value >= 0.0, field, value, what)?;
     }
     if s.category == Category::CutOut && s.kept && (s.lead.is_none() || s.lead_gap.is_none()) {
         return Err(Problem {

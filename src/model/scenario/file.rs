@@ -143,7 +143,7 @@ fn read_json_lines(path: &Path, implausible: Implausible) -> Result<ScenarioFile
         if text.is_empty() {
             continue;
         }
-        match serde_json::from_str::<Scenario>(text) {
+        match serde_json::from_str::<Scenario>(text).or_else(|error| of_flat(text).ok_or(error)) {
             Ok(scenario) => {
                 let place = place.of(name(&scenario.id));
                 found.take(scenario, row, "line", |field| place.clone().column(field));
@@ -152,6 +152,16 @@ fn read_json_lines(path: &Path, implausible: Implausible) -> Result<ScenarioFile
         }
     }
     found.finish(Place::file(path), ONE_OBJECT)
+}
+
+/// A scenario whose fields have the names of the table, as programs write a table as JSON Lines.
+fn of_flat(text: &str) -> Option<Scenario> {
+    let flat: Value = serde_json::from_str(text).ok()?;
+    let mut scenario = serde_json::Map::new();
+    for leaf in leaves() {
+        leaf.put(&mut scenario, flat.get(&leaf.flat).cloned().unwrap_or_default());
+    }
+    serde_json::from_value(Value::Object(scenario)).ok()
 }
 
 /// Writes a scenario file atomically.

@@ -323,7 +323,10 @@ fn cell(leaf: &Leaf, at: usize) -> TableCell<'_> {
         DataType::UInt8 => TableCell::Whole(value!(UInt8Type).into()),
         DataType::UInt16 => TableCell::Whole(value!(UInt16Type).into()),
         DataType::UInt32 => TableCell::Whole(value!(UInt32Type).into()),
-        DataType::UInt64 => i64::try_from(value!(UInt64Type)).map_or(TableCell::Null, TableCell::Whole),
+        DataType::UInt64 => {
+            let value = value!(UInt64Type);
+            i64::try_from(value).map_or_else(|_| TableCell::Text(value.to_string().into()), TableCell::Whole)
+        }
         DataType::Float16 => TableCell::Number(value!(Float16Type).into()),
         DataType::Float32 => TableCell::Number(value!(Float32Type).into()),
         DataType::Float64 => TableCell::Number(value!(Float64Type)),

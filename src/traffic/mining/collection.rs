@@ -2,6 +2,7 @@
 //! hold, the result in the recordings' order. A recording that cannot be read is reported; the others are used.
 
 use std::collections::HashSet;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::Path;
 use std::sync::{Condvar, Mutex, PoisonError};
 
@@ -40,6 +41,9 @@ pub struct RecordingSummary {
     /// Name and checksum of the preset that the files were read by; none for highD's format and generated recordings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub preset: Option<String>,
+    /// Equal for recordings in which all vehicles have the same positions.
+    #[serde(skip)]
+    content: u64,
 }
 
 /// Scenarios of many recordings.
@@ -71,6 +75,7 @@ impl Collection {
             frame_rate_hz: recording.frame_rate_hz,
             files,
             preset: None,
+            content: content(recording),
         };
         let (scenarios, recordings) = (mined.scenarios, vec![summary]);
         Collection { scenarios, recordings, synthetic: recording.synthetic, ..Collection::default() }
@@ -197,7 +202,10 @@ pub fn mine_inputs(
         let mut part = Collection::of(&loaded.recording, mined, loaded.checksum_sha256, options);
         part.recordings[0].preset.clone_from(&preset);
         let name = |note: String| format!("recording {}: {note}", loaded.recording.id);
-        part.notes = loaded.notes.into_iter().chain(doubts).chain(of_noise).map(name).collect();
+        let cut_m = options.ego_view.cut_m;
+        let no_ego = (part.recordings[0].data_sets == 0)
+            .then(|| format!("no vehicle drives {cut_m} m in view (`ego_view.cut_m`), so none is an ego: lower it"));
+        part.notes = loaded.notes.into_iter().chain(doubts).chain(of_noise).chain(no_ego).map(name).collect();
         Collection { problems, ..part }
     };
     let turns = Turns::default();
@@ -218,14 +226,19 @@ pub fn mine_inputs(
         match parts {
             Ok(parts) => {
                 for part in parts {
-                    let id = part.recordings[0].id.clone();
-                    if names.insert(id.clone()) {
-                        collection.add(part);
-                        continue;
-                    }
-                    let place = Place::item(format!("recording {id}"));
-                    let problem = "another file has a recording of this name";
-                    collection.problems.push(Error::input(place, problem, "rename one of the files"));
+                    let own = &part.recordings[0];
+                    let problem = match collection.recordings.iter().find(|of| of.content == own.content) {
+                        _ if names.contains(&own.id) => "another file has a recording of this name".to_owned(),
+                        Some(other) => format!("it is recording {} again: all positions are equal", other.id),
+                        None => {
+                            names.insert(own.id.clone());
+                            collection.add(part);
+                            continue;
+                        }
+                    };
+                    let place = Place::item(format!("recording {}", own.id));
+                    let help = "rename one of the files, or remove it if it is a copy";
+                    collection.problems.push(Error::input(place, problem, help));
                 }
             }
             Err(error) => collection.problems.push(error),
@@ -277,6 +290,15 @@ pub fn mine_generated(
     let mut collection = Collection::default();
     parts.into_iter().for_each(|part| collection.add(part));
     Ok(collection)
+}
+
+/// A checksum of all positions.
+fn content(recording: &Recording) -> u64 {
+    let mut hash = DefaultHasher::new();
+    for value in recording.tracks.iter().flat_map(|track| track.s_m.iter().chain(&track.d_m)) {
+        value.to_bits().hash(&mut hash);
+    }
+    hash.finish()
 }
 
 /// Time and distance of all ego data sets, from each ego's first sample to its last with tags: the exposure.

@@ -10,7 +10,7 @@
 //! in that lane and in range until the end, and is slower than the ego at t = 0.
 
 use super::cut_in::with_lane_change;
-use super::data_set::{DataSet, FoundScenario, Stretch, micrometres};
+use super::data_set::{DataSet, FoundScenario, Stretch, gap_m, micrometres};
 use super::options::{CutOutOptions, TOLERANCE};
 use super::tags::{Item, Match, Tags};
 use crate::scenario::{Category, Scenario};
@@ -29,10 +29,9 @@ pub(super) fn scenario(set: &DataSet, target_index: usize, matched: &Match, stre
         Ok(lead) => {
             let target = found.target;
             let (j, l) = (found.sample_of(target, found.start)?, found.sample_of(lead, found.start)?);
-            let lead_gap = lead.s_m[l] - target.s_m[j] - 0.5 * (lead.length_m + target.length_m);
             scenario.lead_id = Some(lead.id);
             scenario.lead = Some(found.other(lead, scenario.side)?);
-            scenario.lead_gap = Some(micrometres(lead_gap));
+            scenario.lead_gap = Some(micrometres(gap_m((target, j), (lead, l))));
             (scenario.kept, scenario.reason) = verdict(&scenario, &set.recording_tags.options.cut_out);
         }
         Err(reason) => scenario.reason = reason.to_owned(),
@@ -47,8 +46,10 @@ fn uncovered<'a>(found: &FoundScenario<'a>) -> Result<&'a Track, &'static str> {
     let nobody = "no vehicle ahead of the target in the ego's lane";
     let j = found.sample_of(found.target, found.start).ok_or(nobody)?;
     let lane = set.ego.lane[found.start];
-    let (index, _) = set.ahead_in_lane(found.start, found.target.s_m[j]).next().ok_or(nobody)?;
-    let lead = &set.recording_tags.recording.tracks[index];
+    let tracks = &set.recording_tags.recording.tracks;
+    let mut ahead = set.ahead_in_lane(found.start, found.target.s_m[j]);
+    let is_ahead = |at: &(usize, usize)| gap_m((found.target, j), (&tracks[at.0], at.1)) >= -TOLERANCE;
+    let lead = &tracks[ahead.find(is_ahead).ok_or(nobody)?.0];
     let stays = (found.start..=found.end)
         .all(|k| found.sample_of(lead, k).is_some_and(|l| set.in_lane(lane, lead.d_m[l]) && set.in_range(k, lead, l)));
     if stays { Ok(lead) } else { Err("vehicle ahead does not stay in the lane and in range") }

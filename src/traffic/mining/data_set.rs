@@ -57,7 +57,13 @@ impl<'a> DataSet<'a> {
         let samples = recording_tags.options.ego_view.last_sample(ego)? + 1;
         let carriageway = &recording_tags.recording.carriageways[ego.carriageway];
         let mut set = DataSet { recording_tags, ego_index, ego, carriageway, samples, leader: Vec::new() };
-        set.leader = (0..samples).map(|k| set.leader_at(k)).collect();
+        let mut last = None;
+        set.leader = (0..samples)
+            .map(|k| {
+                last = set.leader_at(k, last);
+                last
+            })
+            .collect();
         Some(set)
     }
 
@@ -87,11 +93,6 @@ impl<'a> DataSet<'a> {
             .is_some_and(|lane| lane.left_m - d_m >= -TOLERANCE && lane.right_m - d_m <= TOLERANCE)
     }
 
-    /// Gap from the ego to `other`, bumper to bumper, m, at the ego's sample `k` and the other's `j`.
-    fn gap_m(&self, k: usize, other: &Track, j: usize) -> f64 {
-        other.s_m[j] - self.ego.s_m[k] - 0.5 * (self.ego.length_m + other.length_m)
-    }
-
     /// Vehicles ahead of `s_m` in the ego's lane and in range at the ego's sample `k`, nearest first:
     /// index of the track, its sample.
     pub(super) fn ahead_in_lane(&self, k: usize, s_m: f64) -> impl Iterator<Item = (usize, usize)> {
@@ -107,13 +108,15 @@ impl<'a> DataSet<'a> {
             })
     }
 
-    /// Leader: in front, same lane, gap of at most the leader's THW, nearest of those.
-    fn leader_at(&self, k: usize) -> Option<u32> {
+    /// Leader: in front, same lane, gap of at most the leader's THW, nearest of those. A vehicle beside the ego does not become
+    /// one; `last` stays it, because boxes that are a little too long touch in a queue.
+    fn leader_at(&self, k: usize, last: Option<u32>) -> Option<u32> {
         let options = self.recording_tags.options;
         let reach = options.leader_max_thw_s * self.ego.v_s_mps[k] + TOLERANCE;
-        self.ahead_in_lane(k, self.ego.s_m[k])
-            .find(|&(track, j)| self.gap_m(k, &self.recording_tags.recording.tracks[track], j) <= reach)
-            .map(|(track, _)| track as u32)
+        let leads = |track: u32, gap_m: f64| gap_m <= reach && (gap_m >= -TOLERANCE || last == Some(track));
+        let tracks = &self.recording_tags.recording.tracks;
+        let mut ahead = self.ahead_in_lane(k, self.ego.s_m[k]);
+        ahead.find(|&(at, j)| leads(at as u32, gap_m((self.ego, k), (&tracks[at], j)))).map(|(at, _)| at as u32)
     }
 
     /// The tags of the ego and the target with index `target`, where the target is in the data set.
@@ -191,7 +194,11 @@ impl FoundScenario<'_> {
         let lane = self.lane()?;
         let (first, last) = (self.sample_of(self.target, self.start)?, self.sample_of(self.target, self.end)?);
         let v0 = speed(ego.v_s_mps[self.start]);
-        let gap0 = micrometres(self.set.gap_m(self.start, self.target, first));
+        let gap0 = micrometres(gap_m((ego, self.start), (self.target, first)));
+        // A vehicle that was the leader and is beside the ego now is no start of a case.
+        if self.category != Category::CutIn && gap0 < 0.0 {
+            return None;
+        }
         let frame0 = self.frame(self.start);
         let recording = &recording_tags.recording.id;
         Some(Scenario {
@@ -235,6 +242,11 @@ impl FoundScenario<'_> {
             y: other.d_m[first..=last].iter().map(|d| micrometres(side.sign() * (d - centre_m))).collect(),
         })
     }
+}
+
+/// Gap from a vehicle at its sample to another one ahead at its own, bumper to bumper, m.
+pub(super) fn gap_m((behind, k): (&Track, usize), (ahead, j): (&Track, usize)) -> f64 {
+    ahead.s_m[j] - behind.s_m[k] - 0.5 * (behind.length_m + ahead.length_m)
 }
 
 /// A speed of a scenario, ≥ 0: recordings give stationary vehicles a few centimetres per second backwards.

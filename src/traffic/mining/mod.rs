@@ -15,6 +15,7 @@
 //! activities compare the recorded speeds exactly.
 
 mod collection;
+mod copies;
 pub mod cut_in;
 mod cut_out;
 mod data_set;
@@ -29,6 +30,7 @@ pub mod tags;
 pub use collection::{
     Collection, RecordingSummary, count, counts, counts_text, mine_folder, mine_generated, mine_inputs,
 };
+pub(super) use copies::leave_out_copies;
 pub use miner::{CategoryCount, Mined, mine};
 pub use noise::noise_notes;
 pub use options::{

@@ -49,7 +49,9 @@ impl Inputs {
             return highd_inputs(path);
         }
         if !path.is_dir() {
+            let has_meta = is_highd_name(path) && highd_inputs(path).is_ok_and(|of| of.highd[0].is_complete());
             return match tracks::detect(path)? {
+                Some(preset) if preset.is_generic() && has_meta => highd_inputs(path),
                 Some(preset) => with(preset),
                 None if is_highd_name(path) => highd_inputs(path),
                 None => Err(unknown(path)),
@@ -80,6 +82,9 @@ impl Inputs {
                 self.problems.push(Error::input(Place::file(&file), "it may hold tracks, and is compressed", help));
             }
             let is_highd = own.is_none() && is_of_highd(&file);
+            if is_highd && file.to_str().is_none() {
+                self.problems.push(Error::input(Place::file(&file), "its name is not UTF-8", "rename it"));
+            }
             let is_meta = self.preset().is_some_and(|preset| tracks::is_meta(&name, preset));
             if is_highd || is_meta || !tracks::may_hold_tracks(&file) {
                 continue;

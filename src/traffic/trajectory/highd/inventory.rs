@@ -5,6 +5,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::support::input_file;
+use crate::traffic::trajectory::inputs::files_of;
+use crate::traffic::trajectory::tracks::may_hold_tracks;
 use crate::{Error, Place, Result};
 
 /// The three files of one recording.
@@ -33,6 +35,13 @@ impl HighdFiles {
         let [tracks, tracks_meta, recording_meta] =
             [tracks, tracks_meta, recording_meta].map(input_file::packed_or_not);
         HighdFiles { id, tracks, tracks_meta, recording_meta }
+    }
+}
+
+impl HighdFiles {
+    /// Whether all three are there.
+    pub(in crate::traffic::trajectory) fn is_complete(&self) -> bool {
+        self.tracks.exists() && self.tracks_meta.exists() && self.recording_meta.exists()
     }
 }
 
@@ -130,9 +139,12 @@ fn prefixes(dir: &Path) -> Result<BTreeMap<String, [bool; 3]>> {
 fn nothing_complete(dir: &Path, mut problems: Vec<Error>) -> Error {
     match problems.len() {
         0 => {
-            let help = match subfolder_with_recordings(dir) {
-                Some(inner) => format!("the folder {} has recordings: name that one", inner.display()),
-                None => "name a folder with highD-format recordings".to_owned(),
+            let inner: Vec<String> =
+                subfolders_with_recordings(dir).iter().map(|of| of.display().to_string()).collect();
+            let help = match &inner[..] {
+                [] => "name a folder with highD-format recordings".to_owned(),
+                [inner] => format!("the folder {inner} has recordings: name that one"),
+                several => format!("these folders have recordings, name one of them: {}", several.join(", ")),
             };
             Error::input(
                 Place::file(dir),
@@ -149,12 +161,15 @@ fn nothing_complete(dir: &Path, mut problems: Vec<Error>) -> Error {
     }
 }
 
-/// The highD archive unpacks into `data/`, so users often name the outer folder.
-fn subfolder_with_recordings(dir: &Path) -> Option<PathBuf> {
-    let mut folders: Vec<PathBuf> =
-        fs::read_dir(dir).ok()?.flatten().map(|entry| entry.path()).filter(|path| path.is_dir()).collect();
+/// The highD archive unpacks into `data/`, and simulations have a folder for each run, so users often name the outer one.
+fn subfolders_with_recordings(dir: &Path) -> Vec<PathBuf> {
+    let listed = fs::read_dir(dir).into_iter().flatten().flatten().map(|entry| entry.path());
+    let is_such = |folder: &PathBuf| {
+        folder.is_dir() && files_of(folder).is_ok_and(|all| all.iter().any(|of| may_hold_tracks(of)))
+    };
+    let mut folders: Vec<PathBuf> = listed.filter(is_such).collect();
     folders.sort();
-    folders.into_iter().find(|folder| prefixes(folder).is_ok_and(|found| !found.is_empty()))
+    folders
 }
 
 fn are(names: &[String]) -> String {

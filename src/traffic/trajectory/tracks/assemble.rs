@@ -7,7 +7,7 @@ use super::boxes::{Sized, centre, is_ignored, sized};
 use super::directions::{Placed, oncoming_left_m, road};
 use super::lanes::{BY_NAME, Lateral, lane_lines};
 use super::pieces::{Piece, pieces};
-use super::preset::{Preset, Reference};
+use super::preset::Preset;
 use super::raw::{FileFacts, RawRecording, RawVehicle};
 use super::road::{Path, RoadLine, cross, dot, median};
 use super::roles::Role;
@@ -55,24 +55,19 @@ pub(super) fn assemble(
     }
     let has = |wanted: Role| file.roles.iter().any(|(role, _)| *role == wanted);
     let has_heading = has(Role::Heading);
-    for (piece, of) in pieces.iter_mut().zip(&boxes) {
-        centre(piece, of, preset, has_heading);
-    }
+    let longest = pieces.iter().map(Piece::travel_m).max_by(|a, b| dot(*a, *a).total_cmp(&dot(*b, *b)));
+    let travel = longest.unwrap_or_default();
+    let left: Vec<f64> = pieces.iter_mut().zip(&boxes).map(|(piece, of)| centre(piece, of, preset, travel)).collect();
     let (lines, forward) = road(&pieces, &raw, preset, rate_hz).ok_or_else(|| {
         Error::input(place.clone(), "no vehicle moves, so the road is unknown", "check x and y and their units")
     })?;
-    let shift_along = match (preset.reference, has_heading) {
-        (Reference::Front, false) => -0.5,
-        (Reference::Rear, false) => 0.5,
-        _ => 0.0,
-    };
-    let placed = pieces.into_iter().zip(boxes).zip(forward).filter_map(|((piece, sized), is_forward)| {
-        // A direction in which nothing moves has no line.
-        let mut on = lines[usize::from(is_forward)].as_ref()?.project_all(&path(&piece));
-        let by_m = shift_along * sized.length_m;
-        on.iter_mut().for_each(|p| p.s_m += by_m);
-        Some(Placed { piece, sized, is_forward, on })
-    });
+    let placed =
+        pieces.into_iter().zip(boxes).zip(left).zip(forward).filter_map(|(((piece, sized), left), is_forward)| {
+            // A direction in which nothing moves has no line.
+            let mut on = lines[usize::from(is_forward)].as_ref()?.project_all(&path(&piece));
+            on.iter_mut().for_each(|p| p.s_m += left * sized.length_m);
+            Some(Placed { piece, sized, is_forward, on })
+        });
     let mut placed: Vec<Placed> = placed.collect();
     about.seen.is_curved = !lines.iter().flatten().all(RoadLine::is_straight);
     about.seen.oncoming_left_m = oncoming_left_m(&lines, &placed);

@@ -3,7 +3,7 @@
 use super::pieces::Piece;
 use super::preset::{Preset, Reference};
 use super::raw::RawVehicle;
-use super::road::median;
+use super::road::{median, unit};
 use super::samples::{HEADING_X, HEADING_Y, Sample, X, Y};
 use crate::traffic::trajectory::VehicleClass;
 
@@ -52,35 +52,34 @@ pub(super) fn sized(piece: &Piece, vehicle: &RawVehicle, classes: &[String], pre
     }
 }
 
-/// Moves the positions from the reference point to the middle of the box, along the heading of each sample, or the travel.
-pub(super) fn centre(piece: &mut Piece, of: &Sized, preset: &Preset, has_heading: bool) {
-    let reference = preset.reference;
-    if reference == Reference::Centre || (reference != Reference::Corner && !has_heading) {
-        return;
-    }
-    let (first, last) = (piece.samples.xy_m(0), piece.samples.xy_m(piece.samples.len() - 1));
-    let travel = [last[0] - first[0], last[1] - first[1]];
+/// Moves the positions from the reference point to the middle of the box along the heading of each sample, or the last one
+/// before it. Returns what is left to do along the road, in lengths of the box, where the piece has no heading. `travel` is that
+/// of the recording.
+pub(super) fn centre(piece: &mut Piece, of: &Sized, preset: &Preset, travel: [f64; 2]) -> f64 {
+    let along = match preset.reference {
+        Reference::Centre => return 0.0,
+        Reference::Front => -0.5,
+        Reference::Rear => 0.5,
+        Reference::Corner => 0.0,
+    };
+    let mut headings = (0..piece.samples.len()).map(|k| piece.samples.heading(k));
+    let is_corner = preset.reference == Reference::Corner;
+    let first = headings.find(|heading| !heading[0].is_nan());
+    let Some(mut heading) = first.or(is_corner.then_some(travel)) else { return along };
     let mut samples: Vec<Sample> = piece.samples.to_vec();
     for sample in &mut samples {
-        let heading = [sample[HEADING_X], sample[HEADING_Y]];
-        let heading = if heading[0].is_nan() { travel } else { heading };
-        let norm = libm::hypot(heading[0], heading[1]);
-        if norm > 0.0 {
-            let heading = [heading[0] / norm, heading[1] / norm];
-            let along = |metres: f64| heading.map(|part| metres * part);
-            let by = match reference {
-                Reference::Centre => [0.0; 2],
-                Reference::Front => along(-of.length_m / 2.0),
-                Reference::Rear => along(of.length_m / 2.0),
-                // The box lies along the axes: its larger extent along the one that the vehicle drives along.
-                Reference::Corner => {
-                    let is_along_x = heading[0].abs() >= heading[1].abs();
-                    let (x_m, y_m) = if is_along_x { (of.length_m, of.width_m) } else { (of.width_m, of.length_m) };
-                    [x_m / 2.0, preset.axes.y_sign() * y_m / 2.0]
-                }
-            };
-            (sample[X], sample[Y]) = (sample[X] + by[0], sample[Y] + by[1]);
+        if !sample[HEADING_X].is_nan() {
+            heading = [sample[HEADING_X], sample[HEADING_Y]];
         }
+        // The box of a corner lies along the axes: its larger extent along the one that the vehicle drives along.
+        let is_along_x = heading[0].abs() >= heading[1].abs();
+        let (x_m, y_m) = if is_along_x { (of.length_m, of.width_m) } else { (of.width_m, of.length_m) };
+        let by = match is_corner {
+            true => [x_m / 2.0, preset.axes.y_sign() * y_m / 2.0],
+            false => unit(heading).unwrap_or_default().map(|part| along * of.length_m * part),
+        };
+        (sample[X], sample[Y]) = (sample[X] + by[0], sample[Y] + by[1]);
     }
     piece.samples = samples.iter().collect();
+    0.0
 }

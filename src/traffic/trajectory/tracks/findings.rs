@@ -20,6 +20,8 @@ const MAX_OVERLAPPING: f64 = 0.1;
 /// Fraction of vehicles that cross the road by more than the distance (m) from which on it is no motorway.
 const MAX_ACROSS: f64 = 0.15;
 const ACROSS_M: f64 = 15.0;
+/// What goes farther back along the road drives backwards, m.
+const MAX_BACKWARD_M: f64 = 5.0;
 /// Fewer vehicles prove nothing.
 const MIN_VEHICLES: usize = 5;
 
@@ -209,7 +211,7 @@ impl Understanding {
             let mean = lanes.clone().map(|lane| f64::from(*lane)).sum::<f64>() / lanes.count() as f64;
             (!mean.is_nan()).then(|| (f64::from(u8::from(track.class == VehicleClass::Truck)), mean, 0))
         };
-        let found = slope_within(&mut recording.tracks.iter().filter_map(lane).collect::<Vec<_>>());
+        let found = slope_within(&mut recording.tracks.iter().filter_map(lane).collect::<Vec<_>>(), 0.08);
         // Lane 0 is the leftmost.
         match found {
             Some((by, error)) if by.abs() > 0.15 && (by > 0.0) == is_left => {
@@ -235,10 +237,21 @@ impl Understanding {
                 "{pairs} pairs of vehicles overlap, the first are {first}: check sizes and `reference` (centre, front, rear, corner)"
             ));
         }
-        if let Some((slope, error)) = edge_slope(recording).filter(|(slope, _)| slope.abs() >= 0.6) {
-            let part = significant(slope.abs(), 2);
-            self.find(slope.abs() < 1.6 && slope.abs() > 4.0 * error, format!(
-                "wide vehicles are beside the middle of their lanes by {part} of half their width: the position is that of an edge or a corner, see `reference`, or they are few"
+        let (mut by_lane, mut by_class) = (Vec::new(), Vec::new());
+        for at in 0..recording.carriageways.len() {
+            let mut offsets = self.offsets(recording, at);
+            by_class.extend(slope_within(&mut offsets, 0.02));
+            offsets.iter_mut().for_each(|of| of.2 /= 2);
+            by_lane.extend(slope_within(&mut offsets, 0.08));
+        }
+        let is_edge = |(slope, error): &(f64, f64)| (0.6..1.6).contains(&slope.abs()) && slope.abs() > 4.0 * error;
+        // Lorries may keep to the right in every direction; an edge in the image is on the other side in the other direction.
+        let is_turned = matches!(by_lane[..], [(a, _), (b, _)] if a * b < 0.0);
+        let found = if is_turned && by_lane.iter().all(is_edge) { by_lane } else { by_class };
+        if let Some((slope, error)) = found.first().filter(|_| found.iter().all(is_edge)) {
+            let (slope, error) = (significant(slope.abs(), 2), significant(*error, 1));
+            self.refuse(format!(
+                "the wider a vehicle, the farther it is beside the middle of its lane: by {slope} ± {error} m for each metre of half its width, where an edge or a corner of the box gives 1, see `reference`"
             ));
         }
         let jumping = recording.tracks.iter().filter(|track| jumps(track, recording.frame_rate_hz)).count();
@@ -246,18 +259,46 @@ impl Understanding {
         self.warn_of(jumping as u64, &what);
     }
 
-    /// Leaves out vehicles that drive backwards; the others' speeds below 0 are noise and become 0.
+    /// Half the width of each vehicle that keeps its lane, its mean offset to the left of the lane's middle, m, and its lane and
+    /// class. Tells the offsets by class.
+    fn offsets(&mut self, recording: &Recording, carriageway: usize) -> Vec<(f64, f64, u16)> {
+        let lanes = &recording.carriageways[carriageway];
+        let offset = |track: &Track| {
+            let lane = track.lane[0];
+            let is_kept = track.carriageway == carriageway && track.lane.iter().all(|of| *of == lane);
+            let centre_m = lanes.lane(usize::from(lane)).filter(|_| is_kept)?.centre_m();
+            let mean_m = track.d_m.iter().sum::<f64>() / track.len() as f64 - centre_m;
+            Some((track.width_m / 2.0, mean_m, 2 * lane + u16::from(track.class == VehicleClass::Truck)))
+        };
+        let all: Vec<(f64, f64, u16)> = recording.tracks.iter().filter_map(offset).collect();
+        for (is_truck, class) in [(0, "cars"), (1, "lorries")] {
+            let of: Vec<f64> = all.iter().filter(|of| of.2 % 2 == is_truck).map(|of| of.1).collect();
+            if of.len() >= MIN_VEHICLES {
+                let (n, way) = (of.len() as f64, if lanes.name == "2" { "forward" } else { "backward" });
+                let mean_m = of.iter().sum::<f64>() / n;
+                let error_m = libm::sqrt(of.iter().map(|m| (m - mean_m) * (m - mean_m)).sum::<f64>() / (n * (n - 1.0)));
+                self.fact(
+                    "offsets",
+                    format!("{way}: {class} {mean_m:.2} ± {error_m:.2} m to the left of the middle of their lanes"),
+                );
+            }
+        }
+        all
+    }
+
+    /// Leaves out vehicles that drive backwards, by their positions or their speeds.
     pub(super) fn leave_out_backwards(&mut self, recording: &mut Recording) {
         let all = recording.tracks.len();
-        let against = |track: &&Track| track.s_m[track.len() - 1] - track.s_m[0] < -5.0;
-        let against = recording.tracks.iter().filter(against).count();
-        let what = "vehicle(s) move against their direction of travel: check `direction`";
-        self.find_of(against as u64, 10 * against > all, what);
         let slow = |track: &Track| track.v_s_mps.iter().filter(|v| **v < NOISE_MPS).count();
-        recording.tracks.retain(|track| 20 * slow(track) <= track.len());
+        let is_backward = |of: &Track| of.s_m[of.len() - 1] - of.s_m[0] < -MAX_BACKWARD_M || 20 * slow(of) > of.len();
+        recording.tracks.retain(|track| !is_backward(track));
         let backwards = all - recording.tracks.len();
-        let what = "vehicles drive backwards (faster than 0.5 m/s) and are left out: check `direction` and the signs of the speeds";
+        let what = "vehicles drive backwards (by more than 5 m, or faster than 0.5 m/s) and are left out: check `direction` and the signs of the speeds";
         self.find_of(backwards as u64, 5 * backwards > all, what);
+    }
+
+    /// Sets speeds below 0 to 0: they are noise of vehicles that do not drive backwards.
+    pub(super) fn clear_noise(&mut self, recording: &mut Recording) {
         let (mut noise, mut lowest) = (0, 0.0_f64);
         for v in recording.tracks.iter_mut().flat_map(|track| &mut track.v_s_mps) {
             (noise, lowest) = (noise + u64::from(*v < 0.0), lowest.min(*v));
@@ -275,27 +316,9 @@ fn speed_range_mps(track: &Track, rate_hz: f64) -> f64 {
     high - low
 }
 
-/// Slope of the mean offset from the lane's middle over half the width, with its standard error, of the carriageway where it
-/// is most certain; ±1 if positions are those of an edge.
-fn edge_slope(recording: &Recording) -> Option<(f64, f64)> {
-    let of = |carriageway: usize| {
-        let mut pairs: Vec<(f64, f64, u16)> = Vec::new();
-        for track in recording.tracks.iter().filter(|track| track.carriageway == carriageway) {
-            let lane = track.lane[0];
-            let is_kept = track.lane.iter().all(|l| *l == lane);
-            let middle = recording.carriageways[carriageway].lane(usize::from(lane)).filter(|_| is_kept);
-            let Some(centre) = middle.map(|lane| lane.centre_m()) else { continue };
-            let mean = track.d_m.iter().sum::<f64>() / track.len() as f64 - centre;
-            pairs.push((track.width_m / 2.0, mean, lane));
-        }
-        slope_within(&mut pairs)
-    };
-    (0..recording.carriageways.len()).filter_map(of).max_by(|a, b| (a.0 / a.1).abs().total_cmp(&(b.0 / b.1).abs()))
-}
-
 /// Slope of the second value over the first within groups, so that the middles of lanes do not matter, and its standard error;
-/// `None` for few values, or if the first hardly varies.
-fn slope_within(pairs: &mut [(f64, f64, u16)]) -> Option<(f64, f64)> {
+/// `None` for few values, or if the first varies by less than `least`.
+fn slope_within(pairs: &mut [(f64, f64, u16)], least: f64) -> Option<(f64, f64)> {
     pairs.sort_by(|a, b| a.2.cmp(&b.2).then(a.0.total_cmp(&b.0)).then(a.1.total_cmp(&b.1)));
     let (mut xx, mut xy, mut yy, mut n, mut groups) = (0.0, 0.0, 0.0, 0, 0);
     for group in pairs.chunk_by(|a, b| a.2 == b.2).filter(|group| group.len() >= MIN_VEHICLES) {
@@ -311,5 +334,5 @@ fn slope_within(pairs: &mut [(f64, f64, u16)]) -> Option<(f64, f64)> {
     }
     let slope = xy / xx;
     let residual = (yy - slope * xy).max(0.0) / (n as f64 - f64::from(groups) - 1.0);
-    (n >= 20 && xx / n as f64 > 0.08 * 0.08).then(|| (slope, (residual / xx).sqrt()))
+    (n >= 20 && xx / n as f64 > least * least).then(|| (slope, (residual / xx).sqrt()))
 }

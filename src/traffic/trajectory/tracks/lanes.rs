@@ -86,7 +86,12 @@ fn centres_by_name(samples: &[Lateral]) -> Vec<f64> {
     let groups = sorted.chunk_by(|a, b| a.1 == b.1);
     let mut centres: Vec<(f64, f64)> = groups
         .filter(|group| group.len() as f64 >= MIN_FRACTION * total)
-        .map(|group| (group[group.len() / 2].0, group.len() as f64))
+        .map(|group| {
+            let quarter = |part: usize| group[part * group.len() / 4].0;
+            // A ramp that joins a lane is not beside the others yet.
+            let is_steady = quarter(3) - quarter(1) < MIN_SPACING_M / 2.0;
+            (quarter(2), group.len() as f64 * if is_steady { 1.0 } else { 1e-6 })
+        })
         .collect();
     centres.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut joined: Vec<(f64, f64)> = Vec::new();
@@ -140,7 +145,14 @@ fn centres_by_position(samples: &[Lateral]) -> Vec<f64> {
         let Some(i) = bad else { break };
         peaks.remove(if density[peaks[i - 1]] < density[peaks[i]] { i - 1 } else { i });
     }
-    let mut centres: Vec<f64> = peaks.into_iter().map(|at| low + (at as f64 + 0.5) * RASTER_M).collect();
+    // A raster is off to one side, the median of the vehicles around a peak is not.
+    let refined = |at: usize| {
+        let peak = low + (at as f64 + 0.5) * RASTER_M;
+        let from = d.partition_point(|value| *value < peak - 0.5 * MIN_SPACING_M);
+        let near = &d[from..d.partition_point(|value| *value <= peak + 0.5 * MIN_SPACING_M)];
+        if near.is_empty() { peak } else { 0.5 * (near[(near.len() - 1) / 2] + near[near.len() / 2]) }
+    };
+    let mut centres: Vec<f64> = peaks.into_iter().map(refined).collect();
     centres.reverse();
     centres.truncate(MAX_LANES);
     if centres.is_empty() { vec![d[d.len() / 2]] } else { centres }

@@ -4,14 +4,16 @@ use std::borrow::Cow;
 
 use super::preset::Preset;
 use super::raw::{RawRecording, RawVehicle};
-use super::road::{cross, dot, median, unit};
-use super::samples::{AT, Sample, Samples, X, Y, between};
+use super::road::{cross, dot, median, range, unit};
+use super::samples::{AT, OTHER_CLOCK, Sample, Samples, X, Y, between};
 use super::understanding::Understanding;
 use crate::support::readable::{significant, value};
 use crate::{Error, Place, Result};
 
 /// A sample this far off the raster of times, in frames, is interpolated.
 const OFF_RASTER: f64 = 0.02;
+/// Parts of the unit of rounded times by which the first of them may be off.
+const OFFSETS: [f64; 5] = [0.0, 0.25, -0.25, 0.5, -0.5];
 /// Rows of one vehicle and time that are farther apart contradict each other, m.
 const SAME_PLACE_M: f64 = 0.1;
 /// Pieces of a track with fewer samples tell nothing.
@@ -33,6 +35,14 @@ pub(super) struct Piece {
     pub vehicle: usize,
     pub first_frame: i64,
     pub samples: Samples,
+}
+
+impl Piece {
+    /// From its first position to its last, m.
+    pub(super) fn travel_m(&self) -> [f64; 2] {
+        let (a, b) = (self.samples.xy_m(0), self.samples.xy_m(self.samples.len() - 1));
+        [b[0] - a[0], b[1] - a[1]]
+    }
 }
 
 /// The frame rate, and the tracks in gapless pieces at its frames.
@@ -134,7 +144,7 @@ fn leave_out_repeated(vehicles: &mut [RawVehicle], about: &mut Understanding) {
 /// The frame rate, frames of the recording per frame as recorded, and what turns frames or times of the file into frames of
 /// the recording.
 fn clock(
-    raw: &RawRecording,
+    raw: &mut RawRecording,
     preset: &Preset,
     about: &mut Understanding,
     bad: &dyn Fn(&str, &str) -> Error,
@@ -144,22 +154,22 @@ fn clock(
         return Err(bad("no vehicle has two samples", "check the columns for vehicle and time"));
     }
     let step = median(&mut steps);
+    let of_times = if raw.has_frames { None } else { Some(on_raster(&mut raw.vehicles, step)) };
     let origin = raw.vehicles.iter().map(|vehicle| vehicle.samples.of(AT, 0)).fold(f64::INFINITY, f64::min);
     // Frames as recorded: per second, per unit of the file's times, and that of the first time.
-    let (source, rate_hz, scale, first) = if raw.has_frames {
+    let (source, rate_hz, scale, first) = if let Some(rate_hz) = of_times {
+        about.seen.rate_is_of_times = true;
+        if let Some(said) = preset.frame_rate_hz.filter(|said| (said / rate_hz - 1.0).abs() > 0.02) {
+            about.refuse(format!("the times have {rate_hz:.2} frames per second, the preset says {said}"));
+        }
+        ("times", rate_hz, rate_hz, if origin.abs() < 1e6 { origin * rate_hz } else { 0.0 })
+    } else {
         let rate_hz = raw.frame_rate_hz.or(preset.frame_rate_hz).ok_or_else(|| {
             bad("the frame rate is unknown", "set `frame_rate_hz` in the preset, or name a column for `time`")
         })?;
         let source = if raw.frame_rate_hz.is_some() { "meta file" } else { "preset" };
         let stride = step.round().max(1.0);
         (source, rate_hz / stride, 1.0 / stride, origin / stride)
-    } else {
-        let rate_hz = rate_of_times(raw, step);
-        about.seen.rate_is_of_times = true;
-        if let Some(said) = preset.frame_rate_hz.filter(|said| (said / rate_hz - 1.0).abs() > 0.02) {
-            about.refuse(format!("the times have {rate_hz:.2} frames per second, the preset says {said}"));
-        }
-        ("times", rate_hz, rate_hz, if origin.abs() < 1e6 { origin * rate_hz } else { 0.0 })
     };
     if !(0.1..=1e4).contains(&rate_hz) {
         let problem = format!("{rate_hz} frames per second: the times or the frame rate are wrong");
@@ -194,10 +204,76 @@ fn step_differences_m(samples: &[Sample], time_s: impl Fn(f64) -> f64) -> Vec<f6
     (0..steps.len()).map(|k| closest(k).unwrap_or(0.0).max(0.0)).collect()
 }
 
+/// The rate of the times, of which `step` is the median step. Times that were rounded, to their last digit or to binary32, become
+/// those of the raster that they are within half a unit of; numbers of frames win where the file has them.
+fn on_raster(vehicles: &mut [RawVehicle], step: f64) -> f64 {
+    let rate = rate_of_times(vehicles, step);
+    let all = |column: usize| {
+        vehicles.iter().flat_map(move |of| (0..of.samples.len()).map(move |k| of.samples.of(column, k)))
+    };
+    let unit_s = unit_of_times(|| all(AT));
+    let mut by_frames: Vec<f64> = vehicles
+        .iter()
+        .flat_map(|of| (1..of.samples.len()).map(|k| of.samples.of(OTHER_CLOCK, k) - of.samples.of(OTHER_CLOCK, k - 1)))
+        .collect();
+    let stride = median(&mut by_frames);
+    let has_frames = stride >= 1.0 && all(OTHER_CLOCK).all(|frame| frame.fract() == 0.0);
+    if !has_frames && unit_s * rate <= OFF_RASTER {
+        return rate;
+    }
+    let (first_s, first_frame) = (vehicles[0].samples.of(AT, 0), vehicles[0].samples.of(OTHER_CLOCK, 0));
+    // Steps of the raster since the first time, which may itself be off by `off_s`.
+    let steps = |of: &Samples, k: usize, rate: f64, off_s: f64| match has_frames {
+        true => (of.of(OTHER_CLOCK, k) - first_frame) / stride,
+        false => ((of.of(AT, k) - first_s - off_s) * rate).round(),
+    };
+    // By how much times are off the raster, the least and the most.
+    let off = |rate: f64, off_s: f64| {
+        let off = |of: &Samples, k: usize| of.of(AT, k) - first_s - steps(of, k, rate, off_s) / rate;
+        range(vehicles.iter().flat_map(|of| (0..of.samples.len()).map(|k| off(&of.samples, k)).collect::<Vec<f64>>()))
+    };
+    let whole = rate.round();
+    let usual = [whole, whole / 1.001].into_iter().filter(|usual| (usual / rate - 1.0).abs() < 0.01);
+    let tried = usual.chain([rate]).flat_map(|rate| OFFSETS.map(|part| (rate, part * unit_s)));
+    let fit = |limit_s: f64, (rate, off_s): (f64, f64)| {
+        let (low, high) = off(rate, off_s);
+        (high - low <= limit_s * (1.0 + 1e-6)).then_some((rate, off_s, first_s + 0.5 * (low + high)))
+    };
+    let limit_s = if has_frames { unit_s.max(OFF_RASTER / rate) } else { unit_s };
+    let near = if (whole / rate - 1.0).abs() < 1e-3 { whole } else { rate };
+    let by_frames = || fit(0.9 / rate, (near, 0.0)).filter(|_| has_frames);
+    let found = { tried }.find_map(|tried| fit(limit_s, tried)).or_else(by_frames);
+    let Some((rate, off_s, zero_s)) = found else { return rate };
+    for of in vehicles.iter_mut() {
+        let mut samples = of.samples.to_vec();
+        for (k, sample) in samples.iter_mut().enumerate() {
+            sample[AT] = zero_s + steps(&of.samples, k, rate, off_s) / rate;
+        }
+        of.samples = samples.iter().collect();
+    }
+    rate
+}
+
+/// The unit of the last digit of times, s, at least 0.1 ms, or that of binary32; 0 for others.
+fn unit_of_times<I: Iterator<Item = f64>>(times: impl Fn() -> I) -> f64 {
+    let is_unit = |unit: &f64| {
+        let off = |time: f64| (time / unit - (time / unit).round()).abs();
+        times().all(|time| off(time) < 1e-6 + 1e-15 * (time / unit).abs())
+    };
+    let single_s = times().fold(0.0, |most: f64, time| most.max(time.abs())) * f64::from(f32::EPSILON);
+    match [1.0, 0.1, 0.01, 1e-3, 1e-4].iter().find(|unit| is_unit(unit)) {
+        // A number of binary32 may have been written as a text.
+        Some(unit) if single_s < *unit => unit + single_s,
+        Some(unit) => *unit,
+        None if times().all(|time| f64::from(time as f32) == time) => single_s,
+        None => 0.0,
+    }
+}
+
 /// Steps over time of all vehicles, because a rounded step is not exact, and vehicles may have times of their own.
-fn rate_of_times(raw: &RawRecording, step: f64) -> f64 {
+fn rate_of_times(vehicles: &[RawVehicle], step: f64) -> f64 {
     let (mut steps, mut span) = (0.0, 0.0);
-    for by in raw.vehicles.iter().flat_map(|vehicle| vehicle.samples.steps()) {
+    for by in vehicles.iter().flat_map(|vehicle| vehicle.samples.steps()) {
         // A gap tells less about the step.
         if by < 5.5 * step {
             steps += (by / step).round();

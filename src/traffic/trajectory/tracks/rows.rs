@@ -48,6 +48,15 @@ impl Columns {
         let has_time_unit = named
             .get(&Role::Time)
             .is_some_and(|time| time.unit().is_some_and(|unit| unit != "date") || time.factor(Role::Time) != Some(1.0));
+        // INTERACTION's time has its unit in its name.
+        let in_ms = header.iter().position(|column| letters(column) == "timestampms");
+        let has_time_unit = match in_ms {
+            Some(position) if at[Role::Time as usize].is_none() && named.contains_key(&Role::Time) => {
+                at[Role::Time as usize] = Some((position, 1e-3));
+                true
+            }
+            _ => has_time_unit,
+        };
         let none_numbers = none.iter().filter_map(|text| text.parse().ok()).collect();
         let (names, none) = (header.to_vec(), none.to_vec());
         Columns { at, names, has_time_unit, found_time: Cell::new(None), none, none_numbers }

@@ -84,6 +84,11 @@ impl Samples {
         [self.of(X, k), self.of(Y, k)]
     }
 
+    /// Direction of the front at sample `k`.
+    pub(super) fn heading(&self, k: usize) -> [f64; 2] {
+        [self.of(HEADING_X, k), self.of(HEADING_Y, k)]
+    }
+
     /// Number of the name of the lane of sample `k`.
     pub(super) fn lane(&self, k: usize) -> Option<u32> {
         number(self.of(LANE, k))

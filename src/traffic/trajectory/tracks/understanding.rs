@@ -165,10 +165,11 @@ impl Understanding {
         self.check_road(recording);
         self.check_speeds(recording);
         self.check_units(recording);
+        self.leave_out_backwards(recording);
         self.check_motion(recording);
         self.check_axes(recording, preset);
         self.check_boxes(recording);
-        self.leave_out_backwards(recording);
+        self.clear_noise(recording);
         for (index, of) in recording.carriageways.iter().enumerate() {
             let widths = of.lane_lines_m.windows(2).map(|two| significant(two[0] - two[1], 3));
             let widths = widths.collect::<Vec<_>>().join(" ");
