@@ -14,7 +14,7 @@ use crate::run::reopen::TracedCase;
 use crate::scenario::{
     CaseFile, CaseNumber, CaseParameters, CaseRow, NUMBERS, ParameterRows, PlainCase, RowPlace, Written, si,
 };
-use crate::support::input_file;
+use crate::support::input_file::{self, plain_name};
 use crate::support::plausibility::{Doubts, Implausible};
 use crate::support::table::{NameUnit, TableFormat, TableReader};
 use crate::{Error, Place, Result};
@@ -227,7 +227,7 @@ pub(super) struct GivenCases {
 
 impl GivenCases {
     pub(super) fn open(path: &Path) -> Result<GivenCases> {
-        let format = TableFormat::of(path, &[TableFormat::Csv, TableFormat::Parquet], "--table")?;
+        let format = TableFormat::of(&plain_name(path), &[TableFormat::Csv, TableFormat::Parquet], "--table")?;
         let rows = ParameterRows::new(TableReader::open(path, format)?)?;
         Ok(GivenCases { rows, row: 0, lines: HashMap::new(), doubled: HashMap::new() })
     }

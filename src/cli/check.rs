@@ -9,7 +9,7 @@ use super::case_flags::{CaseFlags, GivenCase, from_table, from_toml};
 use super::check_table::CheckedTable;
 use super::configured::Configured;
 use super::format::FormatFlag;
-use super::source::{PlausibilityFlag, refuse_overwriting, scenarios_of};
+use super::source::{PlausibilityFlag, scenarios_of};
 use super::{COMMIT, Exit, Output};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -18,8 +18,8 @@ use crate::report::case_sheet::CaseSheet;
 use crate::report::trace;
 use crate::run::check::{Check as Checked, Subject};
 use crate::scenario::{Category, Scenario};
-use crate::support::files::write_atomically;
-use crate::support::input_file;
+use crate::support::files::{check_output, write_atomically};
+use crate::support::input_file::{self, plain_name};
 use crate::support::plausibility::Doubts;
 use crate::support::table::TableFormat;
 use crate::{Error, Place, Result};
@@ -169,7 +169,8 @@ impl Check {
     /// The table to be judged with all rows.
     fn whole_table(&self) -> Option<&Path> {
         let path = self.file.as_deref().filter(|_| self.row.is_none() && self.scenario.is_none())?;
-        let ending = path.extension()?;
+        let ending = plain_name(path);
+        let ending = ending.extension()?;
         ["csv", "parquet"].iter().any(|table| ending.eq_ignore_ascii_case(table)).then_some(path)
     }
 
@@ -209,7 +210,7 @@ impl Check {
             return self.of_flags(GivenCase::default(), profile, "a case of flags".to_owned());
         };
         let origin = path.display().to_string();
-        let ending = path.extension().map(|ending| ending.to_ascii_lowercase()).unwrap_or_default();
+        let ending = plain_name(path).extension().map(|ending| ending.to_ascii_lowercase()).unwrap_or_default();
         match (ending.to_str().unwrap_or_default(), &self.scenario) {
             ("toml", None) if self.row.is_some() => {
                 let problem = format!("{origin} is one case and has no rows");
@@ -271,12 +272,11 @@ impl Check {
         Ok(CheckRequest { subject, origin, is_synthetic, incomplete, doubts: Vec::new() })
     }
 
-    /// Outputs must have the right file ending and must not replace an input.
+    /// Outputs must have the right file ending.
     fn guard_outputs(&self) -> Result<()> {
-        let inputs: Vec<PathBuf> = self.file.iter().cloned().collect();
         if let Some(path) = &self.rows {
             TableFormat::of(path, &TableFormat::EVERY, "--rows")?;
-            refuse_overwriting(path, &inputs, "--rows")?;
+            check_output(path)?;
         }
         let outputs = [(&self.sheet, "html", "--sheet"), (&self.series, "csv", "--series")];
         for (path, ending, flag) in outputs {
@@ -285,7 +285,7 @@ impl Check {
                 let problem = format!("{} does not end in .{ending}", path.display());
                 return Err(Error::usage(Place::item(flag), problem, format!("give a name that ends in .{ending}")));
             }
-            refuse_overwriting(path, &inputs, flag)?;
+            check_output(path)?;
         }
         Ok(())
     }

@@ -19,6 +19,7 @@ use crate::report::case_sheet::CaseSheet;
 use crate::report::case_table::{CaseAnswer, CaseAnswers};
 use crate::run::check::{Check, Subject, nominal_verdicts};
 use crate::support::files::make_folder_of;
+use crate::support::input_file::unchanged;
 use crate::support::plausibility::{Doubts, Implausible};
 use crate::{Error, Place, Result};
 
@@ -78,6 +79,7 @@ impl CheckedTable<'_> {
             }
             Ok(())
         })?;
+        unchanged(self.path)?;
         cases.retain(|case: &CaseAnswer| {
             let refused = case.id().and_then(|id| table.refused_later(id));
             let is_used = refused.is_none();

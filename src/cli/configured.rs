@@ -2,7 +2,6 @@
 //! settings. `--backend` and `--device` determine the opened backend.
 
 use std::collections::BTreeSet;
-use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::builder::{PossibleValue, PossibleValuesParser};
@@ -307,11 +306,6 @@ impl Configured {
     /// Whether a key was set.
     pub(super) fn is_set(&self, key: &str) -> bool {
         self.layers.given().any(|setting| setting.key.name == key)
-    }
-
-    /// The configuration files; no result may overwrite them.
-    pub(super) fn files(&self) -> &[PathBuf] {
-        self.layers.files()
     }
 
     /// All settings, for the record of a run; without those that a plan file decides, if one was given.

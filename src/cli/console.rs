@@ -190,7 +190,9 @@ pub(super) fn progress(verbosity: Verbosity, units: Total, what: &str) -> Progre
         captured.bar = Some(bar.clone());
     } else if verbosity != Verbosity::Quiet && !is_terminal {
         let weak = bar.downgrade();
-        std::thread::spawn(move || tell_at_intervals(&weak, bound, BETWEEN_LINES, |line| tracing::info!("{line}")));
+        let tell = move || tell_at_intervals(&weak, bound, BETWEEN_LINES, |line| tracing::info!("{line}"));
+        // A system without another thread hears nothing on the way.
+        let _ = std::thread::Builder::new().spawn(tell);
     }
     bar
 }
@@ -276,6 +278,9 @@ pub(super) fn warn<'a>(errors: impl IntoIterator<Item = &'a Error>) {
     errors.into_iter().for_each(|error| tracing::warn!("{error}; {}", error.help().unwrap_or_default()));
 }
 
+/// A character without a meaning, of the width of a hyphen.
+const HYPHEN: &str = "\u{e000}";
+
 /// Prints an error with its help on stderr.
 pub(super) fn complain(error: &Error) {
     if captured().is_some() {
@@ -284,10 +289,13 @@ pub(super) fn complain(error: &Error) {
         return;
     }
     let help = error.help().map(|help| shown(&with_flags(&help)).into_owned());
-    let report = miette::Report::new(Diagnostic { text: shown(&with_flags(&error.to_string())).into_owned(), help });
+    // A word is not cut at a hyphen: it may be one of a command.
+    let whole = |text: &str| text.replace('-', HYPHEN);
+    let text = whole(&shown(&with_flags(&error.to_string())));
+    let report = miette::Report::new(Diagnostic { text, help: help.as_deref().map(whole) });
     let mut stderr = io::stderr().lock();
     // Ignore a closed stderr: no message can be shown.
-    let _ = writeln!(stderr, "{report:?}");
+    let _ = writeln!(stderr, "{}", format!("{report:?}").replace(HYPHEN, "-"));
 }
 
 /// Reports an error of the command line, or prints the requested help.

@@ -1,5 +1,6 @@
 //! Exit codes: one documented code per kind of ending.
 
+use std::io::ErrorKind;
 use std::process::ExitCode;
 
 use crate::Error;
@@ -99,6 +100,10 @@ impl From<&Error> for Exit {
         match error {
             Error::Input { .. } => Exit::BadInput,
             Error::Usage { .. } => Exit::Usage,
+            // An input that is missing or damaged stays so: nothing to repeat.
+            Error::Io { action, source, .. } if action.starts_with("read") && is_of_data(source.kind()) => {
+                Exit::BadInput
+            }
             Error::Io { .. } => Exit::Io,
             Error::Device { .. } => Exit::NoDevice,
             Error::Verification(_) => Exit::VerificationFailed,
@@ -106,6 +111,14 @@ impl From<&Error> for Exit {
             Error::Interrupted { .. } | Error::Busy { .. } => Exit::Interrupted,
         }
     }
+}
+
+fn is_of_data(kind: ErrorKind) -> bool {
+    use ErrorKind::{InvalidData, InvalidFilename, InvalidInput, IsADirectory, NotADirectory, NotFound, UnexpectedEof};
+    matches!(
+        kind,
+        InvalidData | InvalidFilename | InvalidInput | IsADirectory | NotADirectory | NotFound | UnexpectedEof
+    )
 }
 
 impl From<Verdict> for Exit {

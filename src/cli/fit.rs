@@ -9,7 +9,7 @@ use super::configured::Configured;
 use super::console::{self, Total};
 use super::format::FormatFlag;
 use super::lists;
-use super::source::{self, SourceFlags};
+use super::source::SourceFlags;
 use super::{Exit, Output};
 use crate::report::density;
 use crate::report::host::SettingRecord;
@@ -18,7 +18,7 @@ use crate::scenario::DataProvenance;
 use crate::scenario::parameterization::Parameterization;
 use crate::stats::density::{DensityModel, FitOptions, write_density};
 use crate::support::error::push_once;
-use crate::support::files::{check_folder_of, file_name, make_folder_of};
+use crate::support::files::{check_output, file_name, make_folder_of};
 use crate::support::readable::counted;
 use crate::support::run_folder::RunFolder;
 use crate::{Error, Place, Result};
@@ -75,11 +75,11 @@ impl Fit {
             valid_draws: config.fit.valid_draws,
             seed: config.fit.seed,
         };
-        let files = self.files(&ids, configured)?;
+        let files = self.files(&ids)?;
         let (collection, facts) = self.data.load_with_exposure(configured, typed)?;
 
         // A single file needs no folder.
-        let folder = (!self.is_single()).then(|| RunFolder::open_without_record(&self.out)).transpose()?;
+        let folder = (!self.is_single()).then(|| RunFolder::open(&self.out, None)).transpose()?;
         let mut fitted: Vec<(PathBuf, DensityModel)> = Vec::new();
         let (mut failed, mut complete) = (Vec::new(), collection.problems.is_empty());
         configured.with_bar(Total::Exact(ids.len() as u64), "fitting", |bar| {
@@ -120,8 +120,8 @@ impl Fit {
         self.parameterizations.list(&self.categories.list()?)
     }
 
-    /// One file per density; none of them may be an input.
-    fn files(&self, ids: &[Parameterization], configured: &Configured) -> Result<Vec<PathBuf>> {
+    /// One file per density.
+    fn files(&self, ids: &[Parameterization]) -> Result<Vec<PathBuf>> {
         let single = self.is_single();
         if single && ids.len() != 1 {
             return Err(Error::usage(
@@ -135,12 +135,7 @@ impl Fit {
             false => self.out.join(format!("{}-{}.json", id.category.key().replace('_', "-"), id.key)),
         };
         let files: Vec<PathBuf> = ids.iter().map(name).collect();
-        let beside: Vec<PathBuf> = self.data.scenarios.as_deref().map(DataProvenance::path_of).into_iter().collect();
-        for file in &files {
-            self.data.refuse_overwriting(file, configured, "--out")?;
-            source::refuse_overwriting(file, &beside, "--out")?;
-            check_folder_of(file)?;
-        }
+        files.iter().try_for_each(|file| check_output(file))?;
         Ok(files)
     }
 
@@ -149,7 +144,7 @@ impl Fit {
     }
 }
 
-/// Publishes all densities together. Each is an independent result with its checksum, so those of other runs are kept.
+/// Publishes all densities together, in place of those of an earlier run.
 fn write(fitted: &[(PathBuf, DensityModel)], folder: Option<&RunFolder>) -> Result<()> {
     let Some(folder) = folder else {
         return fitted.iter().try_for_each(|(file, model)| {
@@ -161,7 +156,7 @@ fn write(fitted: &[(PathBuf, DensityModel)], folder: Option<&RunFolder>) -> Resu
     for (file, model) in fitted {
         results.add(&file_name(file), &model.to_json()?)?;
     }
-    results.publish_each()
+    results.publish_all()
 }
 
 fn text(facts: &DataProvenance, fitted: &[(PathBuf, DensityModel)]) -> String {

@@ -43,7 +43,7 @@ from_arguments!(Merge { folder, failures } groups { format });
 impl Merge {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         if let Some(failures) = &self.failures {
-            guard(failures, "--failures", &self.folder, std::iter::empty())?;
+            guard(failures, "--failures", &self.folder, None)?;
         }
         let [plan, out] =
             [&self.folder.join(PLAN_FILE), &self.folder].map(|path| quoted_word(&path.display().to_string()));

@@ -10,7 +10,7 @@ use super::source::{self, PlausibilityFlag, PresetFlag};
 use super::{Exit, Output, console};
 use crate::Result;
 use crate::scenario::{DataProvenance, check_scenario_file, write_scenarios, write_scenarios_to};
-use crate::support::atomic_file::AtomicFile;
+use crate::support::files::check_output;
 use crate::support::input_file;
 use crate::support::lock::FolderLock;
 use crate::support::readable::counted;
@@ -50,11 +50,8 @@ fn lock_of(path: &Path) -> Result<FolderLock> {
 impl Mine {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         if let Some(path) = &self.out {
-            source::refuse_recording(path, &self.recordings, self.preset.preset.as_deref(), "--out")?;
             check_scenario_file(path)?;
-            source::refuse_overwriting(path, configured.files(), "--out")?;
-            // Check before the work that the file can be written.
-            AtomicFile::create(path).map(drop)?;
+            check_output(path)?;
         }
         let _lock = self.out.as_deref().map(lock_of).transpose()?;
         let from = Source::Recordings { path: self.recordings.clone(), preset: self.preset.preset.clone() };

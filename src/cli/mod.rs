@@ -44,6 +44,7 @@ use clap::{Args, FromArgMatches, Parser, Subcommand};
 use configured::Configured;
 use console::Verbosity;
 
+use crate::support::input_file::guarded;
 use crate::{Error, Result};
 
 #[derive(Parser)]
@@ -160,7 +161,7 @@ fn run_and_report(work: impl FnOnce() -> Result<Exit>) -> Exit {
 
 /// Runs the work. A panic in any thread of the work is a defect of the program, not a user's error.
 fn without_panic<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
-    std::panic::catch_unwind(std::panic::AssertUnwindSafe(work)).unwrap_or_else(|_| {
+    guarded(|| std::panic::catch_unwind(std::panic::AssertUnwindSafe(work))).unwrap_or_else(|_| {
         Err(Error::Internal(
             "the program panicked; see the message above. Existing files are complete; \
                          the same command resumes a run from its journal"

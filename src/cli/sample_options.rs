@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use super::sample::Sample;
-use super::source::file_of;
 use crate::cli::settings::{EstimatorKind, IntervalKind};
 use crate::model::driver::ModelId;
 use crate::report::lanes::table_format;
 use crate::run::sampling::{Estimator, SampleHeadways, SampleOptions, SampleSource, read_proposal};
 use crate::stats::density::{DensityModel, Mixture};
 use crate::stats::estimate::{BinomialInterval, Checkpoints, Goal, Search, StopRule};
+use crate::support::input_file::canonical;
 use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
@@ -142,15 +142,19 @@ impl Sample {
                 "add --estimator is",
             ));
         }
-        refuse_repeats(|| Place::item("--proposal"), self.proposal.iter().map(|path| (file_of(path), path.display())))?;
+        refuse_repeats(
+            || Place::item("--proposal"),
+            self.proposal.iter().map(|path| (canonical(path), path.display())),
+        )?;
         Ok(())
     }
 }
 
-/// Checks that a table of lanes replaces neither an input nor another result.
-pub(super) fn guard<'a>(table: &Path, flag: &str, out: &Path, inputs: impl Iterator<Item = &'a PathBuf>) -> Result<()> {
+/// Checks that a table of lanes replaces no other result.
+pub(super) fn guard(table: &Path, flag: &str, out: &Path, other: Option<&PathBuf>) -> Result<()> {
     let results = ["estimate.json", "estimates.csv", "convergence.csv", "density.json"];
-    let others: Vec<PathBuf> = results.iter().map(|name| out.join(name)).chain(inputs.cloned()).collect();
+    let others: Vec<PathBuf> = results.iter().map(|name| out.join(name)).chain(other.cloned()).collect();
     super::source::refuse_overwriting(table, &others, flag)?;
-    table_format(table).map(drop)
+    table_format(table)?;
+    crate::support::files::check_output(table)
 }

@@ -33,7 +33,7 @@ impl Sample {
             if self.rows.is_some() && sample.lane_plan().is_none() {
                 return Err(only_crude("--rows"));
             }
-            self.guard_tables(std::iter::once(path))?;
+            self.guard_tables()?;
             return self.run_sample(sample, &configured.open()?, configured);
         }
         let (sample, data) = self.planned(configured)?;
@@ -78,23 +78,24 @@ impl Sample {
             ));
         };
         let density = read_density(density)?;
-        check_folder(&self.out)?;
+        match self.shards.plan_only || self.shards.is_part() {
+            true => check_folder(&self.out)?,
+            false => drop(RunFolder::open(&self.out, ESTIMATE_RECORD)?),
+        }
         let profile = configured.profile()?;
         let options = self.options(&density)?;
-        self.guard_tables(self.density.iter().chain(&self.proposal))?;
+        self.guard_tables()?;
         let data = density.provenance.data.clone();
         Ok((sampling::Sample::plan(density, &profile, &options)?, data))
     }
 
-    /// Checks that no table of lanes replaces an input or another result.
-    fn guard_tables<'a>(&'a self, inputs: impl Iterator<Item = &'a PathBuf> + Clone) -> Result<()> {
-        if let Some(rows) = &self.rows {
-            guard(rows, "--rows", &self.out, inputs.clone())?;
-        }
-        match &self.failures {
-            Some(failures) => guard(failures, "--failures", &self.out, inputs.chain(&self.rows)),
-            None => Ok(()),
-        }
+    /// Checks that no table of lanes replaces another result.
+    fn guard_tables(&self) -> Result<()> {
+        let guard = |table: &Option<PathBuf>, flag, other| {
+            table.as_ref().map_or(Ok(()), |table| guard(table, flag, &self.out, other))
+        };
+        guard(&self.rows, "--rows", None)?;
+        guard(&self.failures, "--failures", self.rows.as_ref())
     }
 
     /// Executes a plan, whole or a shard of it.

@@ -9,13 +9,13 @@ use super::case_flags::{CaseFlags, GivenCase, from_table, from_toml, time_s};
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
-use super::source::{PlausibilityFlag, refuse_overwriting, scenarios_of};
+use super::source::{PlausibilityFlag, scenarios_of};
 use super::xosc::{self, XoscFlags};
 use super::{Exit, Output};
 use crate::report::openscenario::{Concrete, PlayOptions, concrete_case};
 use crate::report::trace::TraceReport;
 use crate::run::reopen::{Reopened, TracedLanes};
-use crate::support::files::{file_name, write_atomically};
+use crate::support::files::{check_output, file_name, write_atomically};
 use crate::support::run_folder::is_listed;
 use crate::{Error, Place, Result};
 
@@ -166,7 +166,7 @@ impl Simulate {
         Ok(given)
     }
 
-    /// Checks that the figure is an SVG file and replaces no input.
+    /// Checks that the figure is an SVG file and replaces no result.
     fn guard_plot(&self) -> Result<()> {
         let Some(plot) = &self.plot else { return Ok(()) };
         if let Some(until) = self.plot_end.filter(|until| !(*until > 0.0 && *until < 1e9)) {
@@ -178,9 +178,6 @@ impl Simulate {
             let help = "give a name that ends in .svg; `rsvg-convert` makes PNG and PDF of it";
             return Err(Error::usage(Place::item("--plot"), problem, help));
         }
-        let inputs = [&self.case_file, &self.table, &self.scenarios];
-        let inputs: Vec<PathBuf> = inputs.into_iter().flatten().cloned().collect();
-        refuse_overwriting(plot, &inputs, "--plot")?;
         let is_of_run = |dir: &Path| {
             plot.parent().map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p }) == Some(dir)
                 && plot.file_name().and_then(|name| name.to_str()).is_some_and(|name| is_listed(dir, name))
@@ -189,6 +186,6 @@ impl Simulate {
             let problem = format!("{} is a result of the run", plot.display());
             return Err(Error::usage(Place::item("--plot"), problem, "choose another name"));
         }
-        Ok(())
+        check_output(plot)
     }
 }

@@ -10,10 +10,10 @@ use super::configured::Configured;
 use super::console::{self, Total};
 use super::signals::CANCEL;
 use crate::scenario::{DataProvenance, Driven, Scenario, ScenarioFile, read_scenario_file};
+use crate::support::input_file::canonical;
 use crate::support::plausibility::Implausible;
 use crate::traffic::Source;
 use crate::traffic::mining::{Collection, counts, counts_text};
-use crate::traffic::trajectory::{InputFile, Inputs};
 use crate::{Error, Place, Result};
 
 /// Reads or generates recordings and mines them, with a progress bar; reports skipped input and the number of
@@ -146,12 +146,6 @@ impl SourceFlags {
         }
         Ok((collection, provenance))
     }
-
-    /// Refuses a result that would replace an input of the run.
-    pub(super) fn refuse_overwriting(&self, output: &Path, configured: &Configured, flag: &str) -> Result<()> {
-        let inputs: Vec<PathBuf> = self.scenarios.iter().chain(configured.files()).cloned().collect();
-        refuse_overwriting(output, &inputs, flag)
-    }
 }
 
 /// The scenarios of a file for selecting one, and whether some were skipped; reports what was wrong.
@@ -161,32 +155,14 @@ pub(super) fn scenarios_of(path: &Path, implausible: Implausible) -> Result<(Vec
     Ok((scenarios, !problems.is_empty()))
 }
 
-/// The canonical path of a file, however it is written.
-pub(super) fn file_of(path: &Path) -> PathBuf {
-    // If the file does not exist yet, its folder is resolved.
-    let of_folder = || {
-        let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        Some(parent.canonicalize().ok()?.join(path.file_name()?))
-    };
-    path.canonicalize().ok().or_else(of_folder).unwrap_or_else(|| path.to_path_buf())
-}
-
-/// Refuses an output that is one of these files.
+/// Refuses an output that is another of the run's outputs.
 pub(super) fn refuse_overwriting(output: &Path, others: &[PathBuf], flag: &str) -> Result<()> {
-    match others.iter().find(|other| file_of(other) == file_of(output)) {
+    match others.iter().find(|other| canonical(other) == canonical(output)) {
         Some(other) => Err(Error::usage(
             Place::item(flag),
-            format!("{} would be overwritten: this run reads or writes it", other.display()),
+            format!("{} would be overwritten: this run writes it", other.display()),
             "choose another path",
         )),
         None => Ok(()),
     }
-}
-
-/// Refuses an output that is one of a folder's recordings.
-pub(super) fn refuse_recording(output: &Path, dir: &Path, preset: Option<&str>, flag: &str) -> Result<()> {
-    // The reader reports a folder that cannot be listed.
-    let Ok(inputs) = Inputs::of(dir, preset) else { return Ok(()) };
-    let files: Vec<PathBuf> = inputs.files().0.iter().flat_map(InputFile::paths).collect();
-    refuse_overwriting(output, &files, flag)
 }

@@ -19,10 +19,10 @@ use crate::report::lanes::{study_table, table_format, write_study_chunk};
 use crate::report::study::StudyReport;
 use crate::run::parts::{EachChunk, Job, PLAN_FILE, RUN_PLAN_FILE};
 use crate::run::study::{self, ExternalReplay, ReferenceComparison, StudyOptions, StudyResult};
-use crate::support::files::{check_folder, check_folder_of};
+use crate::support::files::{check_folder, check_output};
 use crate::support::input_file;
 use crate::support::readable;
-use crate::support::run_folder::Results;
+use crate::support::run_folder::{Results, RunFolder, STUDY_RECORD};
 use crate::traffic::Source;
 use crate::{Error, Place, Result};
 
@@ -84,8 +84,10 @@ from_arguments!(
 impl Study {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         self.guard_inputs(configured)?;
-        check_folder(&self.out)?;
-        self.rows.as_deref().map_or(Ok(()), check_folder_of)?;
+        match self.shards.plan_only || self.shards.is_part() {
+            true => check_folder(&self.out)?,
+            false => drop(RunFolder::open(&self.out, STUDY_RECORD)?),
+        }
         let is_binary64 = configured.settings.study.reference;
         if let Some(path) = &self.shards.plan {
             configured.refuse_with_plan()?;
@@ -221,7 +223,7 @@ impl Study {
         Ok(())
     }
 
-    /// Checks that every flag has an effect, and that the lane table replaces neither an input nor another result.
+    /// Checks that every flag has an effect, and that the lane table replaces no other result.
     fn guard_inputs(&self, configured: &Configured) -> Result<()> {
         if configured.settings.study.compare_reference && (self.shards.is_part() || self.shards.plan_only) {
             let problem = "a part of a run cannot compare the arithmetics of the whole run";
@@ -230,17 +232,10 @@ impl Study {
         let Some(lanes) = &self.rows else { return Ok(()) };
         let results = ["failures.csv", "f1.csv", "claims.csv", "reference.csv", "run.json"];
         let results = results.into_iter().chain([PLAN_FILE, RUN_PLAN_FILE]);
-        let mut others: Vec<PathBuf> = results.map(|name| self.out.join(name)).collect();
-        others.extend(self.data.scenarios.clone());
-        others.extend(self.external.iter().cloned());
-        others.extend(configured.files().iter().cloned());
-        others.extend(self.shards.plan.clone());
+        let others: Vec<PathBuf> = results.map(|name| self.out.join(name)).collect();
         source::refuse_overwriting(lanes, &others, "--rows")?;
         table_format(lanes)?;
-        self.data
-            .recordings
-            .as_deref()
-            .map_or(Ok(()), |dir| source::refuse_recording(lanes, dir, self.data.preset.preset.as_deref(), "--rows"))
+        check_output(lanes)
     }
 }
 

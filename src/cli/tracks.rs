@@ -14,14 +14,14 @@ use super::format::FormatFlag;
 use super::{Exit, Output, source};
 use crate::report::tracks::{TrackReport, across};
 use crate::scenario::usable;
-use crate::support::files::check_folder;
+use crate::support::files::check_output;
 use crate::support::plausibility::Implausible;
-use crate::support::run_folder::{Results, RunFolder, unfinished};
+use crate::support::run_folder::RunFolder;
 use crate::support::table::{Table, TableMetadata};
 use crate::traffic::Source;
 use crate::traffic::mining::{counts, mine, noise_notes};
 use crate::traffic::trajectory::generator::generate_one;
-use crate::traffic::trajectory::highd::{self, HighdFiles, SYNTHETIC_MARKER};
+use crate::traffic::trajectory::highd::{self, SYNTHETIC_MARKER};
 use crate::traffic::trajectory::tracks::{LoadedTracks, SYNTHETIC, Understanding, read_tracks};
 use crate::traffic::trajectory::{InputFile, Inputs, Loaded, NO_LANE, Recording, Track, VehicleClass};
 use crate::{Error, Place, Result};
@@ -61,9 +61,18 @@ impl Tracks {
         if self.paths.is_empty() {
             return self.generate(configured);
         }
-        if let Some(out) = &self.out {
-            check_folder(out)?;
+        // Before the work, so that what cannot be written is told at once.
+        let open = |to: &PathBuf, record| RunFolder::open(to, record);
+        let figures = self.out.as_ref().map(|out| open(out, "tracks.json")).transpose()?;
+        let (table, highd) = match &self.convert {
+            Some(to) if to.extension().is_none() => (None, Some(open(to, CONVERTED)?)),
+            to => (to.as_ref(), None),
+        };
+        if let Some(to) = table.filter(|to| to.exists()) {
+            let problem = "it exists, and would be replaced";
+            return Err(Error::usage(Place::file(to), problem, "choose another name, or remove it"));
         }
+        table.map_or(Ok(()), |to| check_output(to))?;
         let (mut reports, mut recordings, mut is_complete) = (Vec::new(), Vec::new(), true);
         let mut ids = BTreeSet::new();
         let is_kept = self.out.is_some() || self.convert.is_some();
@@ -96,12 +105,9 @@ impl Tracks {
         if reports.is_empty() {
             return Ok(Exit::BadInput.into());
         }
-        if let Some(out) = &self.out {
-            write_figures(out, &reports, &recordings)?;
-        }
-        if let Some(to) = &self.convert {
-            convert(to, &reports, &recordings)?;
-        }
+        figures.map_or(Ok(()), |folder| write_figures(&folder, &reports, &recordings))?;
+        table.map_or(Ok(()), |to| convert(to, &recordings))?;
+        highd.map_or(Ok(()), |folder| convert_to_highd(&folder, &reports, &recordings))?;
         let json = || json(&reports);
         let text = || reports.iter().map(TrackReport::text).collect::<Vec<_>>().join("\n");
         self.format.output(if is_complete { Exit::Ok } else { Exit::Incomplete }, text, json)
@@ -114,12 +120,12 @@ impl Tracks {
             return Err(Error::usage(Place::item("lanesweep tracks"), "there is nothing to read", help));
         };
         let options = &configured.settings.generator;
-        check_folder(to)?;
         let folder = RunFolder::open(to, SYNTHETIC_MARKER)?;
-        let mut results = results(&folder, &(1..=options.recordings).map(|k| format!("{k:02}")).collect::<Vec<_>>())?;
+        let mut results = folder.results()?;
         configured.with_bar(Total::Exact(options.recordings as u64), "writing recordings", |bar| {
             (0..options.recordings).try_for_each(|index| {
-                add(&mut results, &generate_one(options, index)?)?;
+                let staged = highd::stage(to, &generate_one(options, index)?)?;
+                staged.into_iter().for_each(|file| results.add_staged(file));
                 source::advance(bar)
             })
         })?;
@@ -160,26 +166,18 @@ fn json(record: &impl Serialize) -> Result<String> {
     serde_json::to_string_pretty(record).map_err(|error| Error::Internal(format!("tracks as JSON: {error}")))
 }
 
-fn write_figures(out: &Path, reports: &[TrackReport], recordings: &[Recording]) -> Result<()> {
-    let folder = RunFolder::open(out, "tracks.json")?;
+fn write_figures(folder: &RunFolder, reports: &[TrackReport], recordings: &[Recording]) -> Result<()> {
     let mut results = folder.results()?;
     for recording in recordings {
         results.add(&format!("{}-lanes.svg", recording.id), across(recording).svg().as_bytes())?;
     }
     results.publish(json(&reports)?.as_bytes())?;
-    tracing::info!("figures written to {}", out.display());
+    tracing::info!("figures written to {}", folder.dir().display());
     Ok(())
 }
 
-/// Writes recordings in highD's format, or as one table.
-fn convert(to: &Path, reports: &[TrackReport], recordings: &[Recording]) -> Result<()> {
-    if to.extension().is_none() {
-        return convert_to_highd(to, reports, recordings);
-    }
-    if to.exists() {
-        let problem = "it exists, and would be replaced";
-        return Err(Error::usage(Place::file(to), problem, "choose another name, or remove it"));
-    }
+/// Writes recordings as one table.
+fn convert(to: &Path, recordings: &[Recording]) -> Result<()> {
     // In one plane: x along the forward carriageway, y to its left.
     let way = |recording: &Recording, track: &Track| {
         if recording.carriageways[track.carriageway].name == "1" { -1.0 } else { 1.0 }
@@ -219,36 +217,13 @@ fn convert(to: &Path, reports: &[TrackReport], recordings: &[Recording]) -> Resu
 /// Record of a conversion: which recording became which.
 const CONVERTED: &str = "converted.json";
 
-/// The results of a folder for recordings of these numbers, of which it holds none.
-fn results<'a>(folder: &'a RunFolder, names: &[String]) -> Result<Results<'a>> {
-    let to = folder.dir();
-    // Files that a killed run was renaming are written anew.
-    let unfinished = unfinished(to).unwrap_or_default();
-    // Links are refused when they would be written.
-    let is_there = |file: &PathBuf| file.exists() && !file.is_symlink();
-    let is_foreign = |file: &PathBuf| is_there(file) && !unfinished.iter().any(|name| file.ends_with(name));
-    let files = names.iter().flat_map(|id| InputFile::Highd(HighdFiles::named(to, id)).paths());
-    if let Some(file) = files.into_iter().find(is_foreign) {
-        let name = file.file_name().unwrap_or_default().to_string_lossy();
-        let problem = format!("it already holds `{name}`, which would be overwritten");
-        return Err(Error::usage(Place::file(to), problem, "choose an empty folder"));
-    }
-    folder.results()
-}
-
-fn add(results: &mut Results, recording: &Recording) -> Result<()> {
-    let staged = highd::stage(results.dir(), recording)?;
-    staged.into_iter().for_each(|file| results.join(file.closed()));
-    Ok(())
-}
-
 /// Writes recordings in highD's format: all of them, or none.
-fn convert_to_highd(to: &Path, reports: &[TrackReport], recordings: &[Recording]) -> Result<()> {
-    let folder = RunFolder::open(to, CONVERTED)?;
-    let names = names(recordings);
-    let mut results = results(&folder, &names)?;
+fn convert_to_highd(folder: &RunFolder, reports: &[TrackReport], recordings: &[Recording]) -> Result<()> {
+    let (to, names) = (folder.dir(), names(recordings));
+    let mut results = folder.results()?;
     for (recording, id) in recordings.iter().zip(&names) {
-        add(&mut results, &Recording { id: id.clone(), ..recording.clone() })?;
+        let staged = highd::stage(to, &Recording { id: id.clone(), ..recording.clone() })?;
+        staged.into_iter().for_each(|file| results.add_staged(file));
     }
     if recordings.iter().any(|recording| recording.synthetic) {
         results.add(SYNTHETIC_MARKER, b"SYNTHETIC DATA: converted from generated recordings\n")?;

@@ -7,11 +7,11 @@ use clap::{Args, ValueEnum};
 use super::arguments::{choices, from_arguments};
 use super::case_flags::time_s;
 use crate::engine::LaneKey;
-use crate::report::openscenario::{Concrete, EgoMotion, PlayOptions, concrete_lanes, export_folder};
+use crate::report::openscenario::{Concrete, EgoMotion, INDEX, PlayOptions, concrete_lanes, export_folder};
 use crate::run::reopen::Reopened;
 use crate::scenario::{Scenario, Side};
-use crate::support::files::check_folder;
 use crate::support::readable::counted;
+use crate::support::run_folder::RunFolder;
 use crate::{Error, Place, Result};
 
 /// OpenSCENARIO files of the lanes.
@@ -73,7 +73,7 @@ impl XoscFlags {
             let problem = format!("{width} m is not a lane width");
             return refused("--lane-width", problem, "give 1 to 20 m, such as 3.5");
         }
-        check_folder(dir)?;
+        drop(RunFolder::open(dir, INDEX)?);
         let side = self.side.map(|side| match side {
             SideFlag::Left => Side::Left,
             SideFlag::Right => Side::Right,

@@ -195,7 +195,6 @@ impl SampleReport {
             text.push_str("Rare failures, by importance sampling:\n");
             text.push_str(&self.table(|row| row.is_rare_beside(&self.estimates)).text());
         }
-        text.push_str("Verdicts: on the draws, on the density (against recorded scenarios), on the data.\n");
         for (of, remark) in self.remarks() {
             let _ = writeln!(text, "{of}: {remark}");
         }
@@ -259,7 +258,7 @@ impl SampleReport {
         if estimates.iter().any(|row| sampled(row).is_some()) {
             table = table.column(Column::from("P/S").null("–"), ratio);
         }
-        table.column(VERDICTS, verdicts).build()
+        table.column(USABLE, |row| row.estimate.trust.usable()).build()
     }
 
     /// A row per estimate, with what it is of.
@@ -298,14 +297,8 @@ pub(super) fn three_digits(name: &'static str) -> Column {
     Column::from(name).digits(Digits::Significant(3))
 }
 
-/// Heading of [`verdicts`].
-pub(super) const VERDICTS: &str = "verdicts";
-
-/// One word for each uncertainty of a row: draws, density, data.
-pub(super) fn verdicts(row: &EstimateRow) -> String {
-    let trust = &row.estimate.trust;
-    format!("{}, {}, {}", trust.draws(), trust.density(), trust.data())
-}
+/// Heading of what a row may be used for.
+pub(super) const USABLE: &str = "usable";
 
 /// Three digits.
 pub(super) fn short(value: f64) -> String {

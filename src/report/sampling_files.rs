@@ -8,7 +8,7 @@ use super::sampling_figures::convergence;
 use super::sampling_tables::convergence_csv;
 use crate::Result;
 use crate::engine::Headway;
-use crate::run::sampling::{Estimator, Sample, SampleResult, proposal_text};
+use crate::run::sampling::{Sample, SampleResult, proposal_text};
 use crate::support::run_folder::{ResultFiles, Results};
 
 impl SampleReport {
@@ -46,10 +46,6 @@ impl SampleReport {
             results.add("convergence.csv", convergence_csv(&run.convergence).as_bytes())?;
             let svg = convergence(density, &run.convergence, self.level()).svg();
             figures.push(PageFigure::add_svg(&mut results, "convergence", &svg, "convergence.csv")?);
-        }
-        if matches!(sample.options.estimator, Estimator::Given { .. }) {
-            // A proposal in this folder may be an input of the run.
-            results.keep(|name| name == "proposal.json");
         }
         if let Some(proposal) = &result.proposal {
             results.add("proposal.json", proposal_text(density, proposal)?.as_bytes())?;

@@ -2,9 +2,7 @@
 
 use super::html::{Page, PageFigure, Section};
 use super::plot::{AxisScale, Figure, Mark, Plot, PlotAxis, Series, Value, is_few};
-use super::sampling::{
-    SampleReport, VERDICTS, interval_text, rate_text, ratio_text, short, three_digits, verdicts, weight,
-};
+use super::sampling::{SampleReport, USABLE, interval_text, rate_text, ratio_text, short, three_digits, weight};
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
@@ -77,7 +75,7 @@ impl SampleReport {
             .column("per hour", |row| rate_text(row.risk.per_hour))
             .column("per 1000 km", |row| rate_text(row.risk.per_1000_km))
             .column("P/S", |row| ratio_text(row.recorded.and_then(|recorded| recorded.sampled)))
-            .column(VERDICTS, verdicts)
+            .column(USABLE, |row| row.estimate.trust.usable())
             .build();
         let mut tables = vec![estimates.captioned(format!(
             "Probability of failure, and risk where the exposure is known. Intervals at {} %{}",
@@ -95,9 +93,8 @@ impl SampleReport {
         }
         Section::new("estimates", "Estimates")
             .intro(format!(
-                "Verdicts: on the draws, on the density, on the data. Draws are sound where their interval holds P of this \
-                 density as often as its level says. The density agrees with recorded scenarios, differs from them, or the \
-                 question is open. Enough scenarios fail, or few. ≤ bounds from above where nothing failed. \
+                "A rate is the recordings' where the density agrees with the recorded scenarios. It is carried by the \
+                 scenarios that fail where these are effectively fewer than ten. ≤ bounds from above where nothing failed. \
                  Probabilities below {} (one in {} scenarios) come from the tails of the density's kernels, not from data. \
                  {}",
                 short(1.0 / self.density.kernels as f64),

@@ -173,12 +173,11 @@ impl SampleReport {
         })
     }
 
-    /// What a rate per hour assumes; `None` if no risk is known or the density samples the headway.
+    /// Why there is no rate per hour; `None` if the density draws the headway.
     fn exposure_rule(&self) -> Option<String> {
-        let is_known = self.estimates.iter().any(|row| row.risk.per_hour.is_some() || row.risk.per_1000_km.is_some());
-        (is_known && !self.plan_headways.is_empty()).then(|| {
-            "Per hour and per 1000 km: scenarios occur as often as observed, but begin at these headways, which are \
-             imposed, not observed; a density fitted with the headway as a parameter draws them"
+        (!self.plan_headways.is_empty()).then(|| {
+            "No rate per hour or per 1000 km: the headways are imposed, not observed; a density fitted with the headway as a \
+             parameter (`with_thw`) draws them and has one"
                 .to_owned()
         })
     }

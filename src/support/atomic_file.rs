@@ -12,6 +12,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::{NamedTempFile, TempPath};
 
+use crate::support::input_file::{claim_output, sha256};
 use crate::{Error, Place, Result};
 
 /// Hidden names are `.lanesweep-<file name>-XXXXXX.part`.
@@ -162,8 +163,9 @@ impl AtomicFile {
     /// that name stays until [`StagedFile::publish`]. Hidden files of killed processes for the same target are removed.
     ///
     /// # Errors
-    /// If the folder cannot be written to.
+    /// If the folder cannot be written to; [`Error::Usage`] for an input of the command.
     pub fn create(target: &Path) -> Result<Self> {
+        claim_output(target)?;
         let target = &resolve(target)?;
         clear_stale(folder_of(target), Some(target));
         AtomicFile::begin(target)
@@ -190,6 +192,7 @@ impl AtomicFile {
         });
         // Hold the registry until the file is in it; an interruption in between would leave the file behind.
         let mut registry = live();
+        let mut tries = 0;
         let file = loop {
             let file = builder.tempfile_in(folder_of(target)).map_err(|source| not_begun(target, source))?;
             // Another process may hold the lock while it checks for stale files. A file system without locks keeps
@@ -197,7 +200,8 @@ impl AtomicFile {
             match file.as_file().try_lock() {
                 Ok(()) if is_named(file.path(), file.as_file()) => break file,
                 Err(TryLockError::Error(_)) => break file,
-                _ => {}
+                _ if tries == 1000 => break file,
+                _ => tries += 1,
             }
         };
         registry.insert(file.path().to_path_buf());
@@ -287,7 +291,7 @@ impl StagedFile {
     /// # Errors
     /// [`Error::Io`] if it cannot be read back.
     pub(super) fn sha256(&self) -> Result<String> {
-        crate::support::input_file::sha256(&self.path)
+        sha256(&self.path)
     }
 
     /// The final path.

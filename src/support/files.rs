@@ -3,7 +3,8 @@
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 
-use crate::support::atomic_file::AtomicFile;
+use crate::support::atomic_file::{AtomicFile, folder_of};
+use crate::support::input_file::claim_output;
 use crate::{Error, Place, Result};
 
 /// Checks that a folder exists or could be created; it only inspects names, before the work starts.
@@ -49,12 +50,13 @@ pub fn check_run_folder(dir: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Like [`check_folder`], for the folder of a file to be written.
+/// Checks before the work that a file can be written and is no input of the command.
 ///
 /// # Errors
-/// As [`check_folder`].
-pub fn check_folder_of(file: &Path) -> Result<()> {
-    file.parent().map_or(Ok(()), check_folder)
+/// As [`AtomicFile::create`] and [`check_folder`].
+pub fn check_output(file: &Path) -> Result<()> {
+    check_folder(folder_of(file))?;
+    if folder_of(file).is_dir() { AtomicFile::create(file).map(drop) } else { claim_output(file) }
 }
 
 /// Creates a folder and its parents if they do not exist.

@@ -3,14 +3,17 @@
 //! Opening a pipe without a writer would block forever, and a device such as `/dev/zero` never ends. All TOML settings
 //! use one reader, so that every error names its line. Texts of other programs may be compressed or in UTF-16.
 
-use std::fs::File;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{File, Metadata};
 use std::io::{BufReader, Cursor, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use flate2::read::MultiGzDecoder;
 use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
 
+use crate::support::atomic_file::folder_of;
 use crate::support::plain_text::{cut_names, hex, nearest};
 use crate::{Error, Place, Result};
 
@@ -20,11 +23,88 @@ pub const MAX_SETTINGS_BYTES: u64 = 1 << 20;
 /// Maximum size of a table that is held in memory, bytes: a few million rows.
 pub const MAX_TABLE_BYTES: u64 = 256 << 20;
 
-/// Opens a regular file, or a link to one.
+/// Size and time of a file's last change.
+type State = (u64, String);
+
+fn state(about: &Metadata) -> State {
+    (about.len(), format!("{:?}", about.modified().ok()))
+}
+
+/// What the command in progress has read, as it was then, and what it writes.
+#[derive(Default)]
+struct InUse {
+    read: BTreeMap<PathBuf, State>,
+    written: BTreeSet<PathBuf>,
+}
+
+static IN_USE: Mutex<Option<InUse>> = Mutex::new(None);
+
+fn in_use() -> MutexGuard<'static, Option<InUse>> {
+    IN_USE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Runs a command; meanwhile no file is an input and an output.
+pub fn guarded<T>(command: impl FnOnce() -> T) -> T {
+    *in_use() = Some(InUse::default());
+    let result = command();
+    *in_use() = None;
+    result
+}
+
+/// The canonical path of a file, however it is written.
+pub fn canonical(path: &Path) -> PathBuf {
+    // If the file does not exist yet, its folder is resolved.
+    let of_folder = || Some(folder_of(path).canonicalize().ok()?.join(path.file_name()?));
+    path.canonicalize().ok().or_else(of_folder).unwrap_or_else(|| path.to_path_buf())
+}
+
+fn both(path: &Path) -> Error {
+    let problem = "it would be overwritten: this run reads and writes it";
+    Error::usage(Place::file(path), problem, "choose another path for the output")
+}
+
+/// Refuses an output that the command has read, and an input that it is going to write.
 ///
 /// # Errors
-/// [`Error::Io`] if it cannot be opened; [`Error::Input`] for a folder, a pipe, a device or a socket.
+/// [`Error::Usage`].
+pub(super) fn claim_output(path: &Path) -> Result<()> {
+    let (mut used, file) = (in_use(), canonical(path));
+    let Some(used) = used.as_mut() else { return Ok(()) };
+    used.written.insert(file.clone());
+    if used.read.contains_key(&file) { Err(both(path)) } else { Ok(()) }
+}
+
+/// Opens a regular file, or a link to one, as an input of the command.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be opened; [`Error::Input`] for a folder, a pipe, a device or a socket; [`Error::Usage`]
+/// for an output of the command.
 pub fn open(path: &Path) -> Result<File> {
+    let opened = open_own(path)?;
+    let about = opened.metadata().map_err(|e| Error::io(path, "read", e))?;
+    let (mut used, file) = (in_use(), canonical(path));
+    let Some(used) = used.as_mut() else { return Ok(opened) };
+    let is_output = used.written.contains(&file);
+    used.read.entry(file).or_insert_with(|| state(&about));
+    if is_output { Err(both(path)) } else { Ok(opened) }
+}
+
+/// Refuses a file that was changed since the command opened it: what was read may be of two states.
+///
+/// # Errors
+/// [`Error::Input`]; [`Error::Io`].
+pub fn unchanged(path: &Path) -> Result<()> {
+    let now = state(&std::fs::metadata(path).map_err(|e| Error::io(path, "read", e))?);
+    match in_use().as_ref().and_then(|used| used.read.get(&canonical(path))) {
+        Some(then) if *then != now => {
+            let problem = "it was changed while it was read";
+            Err(Error::input(Place::file(path), problem, "run again when the other program has saved it"))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn open_own(path: &Path) -> Result<File> {
     let io = |e| Error::io(path, "read", e);
     // Check before opening, because opening a pipe blocks until it has a writer.
     let kind = std::fs::metadata(path).map_err(io)?.file_type();
@@ -78,6 +158,12 @@ pub fn open_text(path: &Path) -> Result<Box<dyn Read + Send>> {
 /// The name of a file that gzip compressed, without its ending; other names as they are.
 pub fn unpacked(name: &str) -> &str {
     name.strip_suffix(".gz").or_else(|| name.strip_suffix(".GZ")).unwrap_or(name)
+}
+
+/// The path without gzip's ending.
+pub fn plain_name(path: &Path) -> PathBuf {
+    let is_packed = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gz"));
+    if is_packed { path.with_extension("") } else { path.to_path_buf() }
 }
 
 /// The file, or the one that gzip compressed in its place.
@@ -186,17 +272,17 @@ pub fn read_text(path: &Path, largest: u64) -> Result<String> {
     })
 }
 
-/// SHA-256 of a regular file of any size, in hexadecimal; read in pieces.
+/// SHA-256 of a regular file of any size, in hexadecimal; read in pieces. It is that of the bytes that the command read.
 ///
 /// # Errors
-/// As [`open`].
+/// As [`open`] and [`unchanged`].
 pub fn sha256(path: &Path) -> Result<String> {
-    let mut file = open(path)?;
+    let mut file = open_own(path)?;
     let mut hash = Sha256::new();
     let mut piece = vec![0; 1 << 16];
     loop {
         match file.read(&mut piece) {
-            Ok(0) => return Ok(hex(&hash.finalize())),
+            Ok(0) => return unchanged(path).map(|()| hex(&hash.finalize())),
             Ok(count) => hash.update(&piece[..count]),
             Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
             Err(e) => return Err(Error::io(path, "read", e)),

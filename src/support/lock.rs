@@ -6,11 +6,13 @@ use std::io::{ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
 use crate::support::atomic_file::folder_of;
-use crate::support::atomic_file::{is_named, refuse_link};
+use crate::support::atomic_file::{Live, is_named, refuse_link};
 use crate::{Error, Place, Result};
 
 /// Maximum length of a lock file, bytes: a process id and an end of line are shorter.
 const MAX_LOCK_BYTES: u64 = 32;
+/// Number of times that the file may be another one after it was locked.
+const MAX_TRIES: usize = 10_000;
 
 /// Exclusive or shared right to write what a lock file protects; dropping it removes the file and releases the lock.
 #[derive(Debug)]
@@ -18,6 +20,7 @@ pub struct FolderLock {
     path: PathBuf,
     /// Holds the lock while it is open.
     file: File,
+    live: Option<Live>,
 }
 
 impl FolderLock {
@@ -43,7 +46,7 @@ impl FolderLock {
         try_lock: impl Fn(&File) -> std::result::Result<(), TryLockError>,
         is_alone: bool,
     ) -> Result<FolderLock> {
-        loop {
+        for _ in 0..MAX_TRIES {
             let Some(mut file) = open(path)? else { continue };
             match try_lock(&file) {
                 Ok(()) => {}
@@ -59,13 +62,18 @@ impl FolderLock {
             // A shared lock has several holders, so no process id is written.
             if is_alone { write_pid(&mut file) } else { file.set_len(0) }
                 .map_err(|source| Error::io(path, "write", source))?;
-            return Ok(FolderLock { path: path.to_path_buf(), file });
+            // Shared, it may be another's too: a signal leaves it.
+            let live = is_alone.then(|| Live::enter(path.to_path_buf()));
+            return Ok(FolderLock { path: path.to_path_buf(), file, live });
         }
+        let why = format!("the folder {} vanished, or its system keeps no files", folder_of(path).display());
+        Err(Error::io(path, "lock", std::io::Error::other(why)))
     }
 }
 
 impl Drop for FolderLock {
     fn drop(&mut self) {
+        self.live = None;
         // Remove the file only while the lock is held exclusively, so that the name cannot belong to another holder,
         // unless the folder was removed and created anew. A remaining file is harmless.
         let is_alone = self.file.unlock().is_ok() && self.file.try_lock().is_ok();
@@ -87,13 +95,8 @@ fn open(path: &Path) -> Result<Option<File>> {
     };
     match result {
         Ok(file) => Ok(Some(file)),
-        // The file vanished between the two calls. The folder exists, or the first call would have failed.
-        Err(error) if error.kind() == ErrorKind::NotFound && folder_of(path).is_dir() => Ok(None),
-        Err(error) if error.kind() == ErrorKind::NotFound => {
-            let folder = folder_of(path).display();
-            let why = format!("the folder {folder} vanished while the run began; the same command begins anew");
-            Err(Error::io(path, "lock", std::io::Error::other(why)))
-        }
+        // The file, or its folder, vanished between the two calls.
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
         Err(error) => Err(Error::io(path, "lock", error)),
     }
 }

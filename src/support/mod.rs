@@ -6,7 +6,6 @@
 pub mod atomic_file;
 pub mod cancel;
 pub mod error;
-mod file_list;
 pub mod files;
 pub mod input_file;
 pub mod lock;

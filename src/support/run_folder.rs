@@ -1,10 +1,10 @@
-//! A run directory: one run at a time writes it, and its record belongs to the files of exactly one run.
+//! A run directory is empty or ours: one run at a time writes it, and what it holds belongs to exactly one run.
 //!
-//! `lanesweep-files.json` lists the files of every run in the folder; without it, the runs' records do. Files that are not
-//! listed are neither removed nor replaced. Results are written under hidden names. Once all are on disk, the list holds the
-//! former and the new files as incomplete, and the former record is removed. Then the results are renamed, the new
-//! record is renamed last, and the list is complete. After a kill in between, the next run removes the listed files
-//! that it does not write itself. Readers of independent files (recordings) refuse an incomplete folder.
+//! `lanesweep-files.json` makes a folder ours. It names the files of the run with the SHA-256 of what lanesweep wrote: a file
+//! that has other bytes, or is not named, is the user's and is neither removed nor replaced. Results are written under
+//! hidden names. Once all are on disk, the list holds the former and the new files as incomplete, and the former record
+//! is removed. Then the results are renamed, the record last, and the list is complete. After a kill in between, the
+//! next run removes the listed files that it does not write itself. Readers of recordings refuse an incomplete folder.
 //!
 //! Parts of a run use the folder together and exclude whole runs: `parts`.
 
@@ -12,18 +12,60 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::support::atomic_file::folder_of;
 use crate::support::atomic_file::{AtomicFile, Live, StagedFile, clear_stale, refuse_link, sync_folder};
-pub use crate::support::file_list::{ESTIMATE_RECORD, MAP_RECORD, STUDY_RECORD};
-use crate::support::file_list::{FileList, LIST, RECORDS, RunFiles};
-use crate::support::files::{make_folder, remove_file};
+use crate::support::files::{file_name, make_folder, remove_file, write_inside};
+use crate::support::input_file;
 use crate::support::lock::FolderLock;
 use crate::{Error, Place, Result};
 
+/// Record of a study.
+pub const STUDY_RECORD: &str = "run.json";
+/// Record of a sampling run.
+pub const ESTIMATE_RECORD: &str = "estimate.json";
+/// Record of a map.
+pub const MAP_RECORD: &str = "map.json";
+
+/// Lists the files of the folder's run.
+const LIST: &str = "lanesweep-files.json";
 /// The lock of the whole folder.
 const LOCK: &str = "run.lock";
+/// What an unfinished run leaves in a folder that has no list yet; the plan of a run in parts makes a folder ours.
+const PLAN: &str = "plan.json";
+const WORK: [&str; 3] = [".lock", ".journal", "search.json"];
+
+/// The content of [`LIST`].
+#[derive(Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileList {
+    /// The record, which is among the files; none where each file is a result by itself.
+    record: Option<String>,
+    /// Name and SHA-256; during the renaming those of both runs.
+    files: BTreeSet<(String, String)>,
+    /// False while the files are being renamed.
+    is_complete: bool,
+}
+
+impl FileList {
+    /// The list of a folder, if it is ours.
+    fn read(dir: &Path) -> Option<FileList> {
+        let text = input_file::read(&dir.join(LIST), input_file::MAX_TABLE_BYTES).ok()?;
+        let list: FileList = serde_json::from_slice(&text).ok()?;
+        let is_plain = |name: &str| file_name(Path::new(name)) == name && !name.starts_with('.');
+        list.files.iter().all(|(name, _)| is_plain(name)).then_some(list)
+    }
+
+    fn write(&self, dir: &Path) -> Result<()> {
+        let text = serde_json::to_vec(self).map_err(|e| Error::Internal(format!("{LIST}: {e}")))?;
+        write_inside(&dir.join(LIST), |file| file.write_all(&text))
+    }
+
+    fn holds(&self, name: &str) -> bool {
+        self.files.iter().any(|(file, _)| file == name)
+    }
+}
 
 /// The right to write a run directory, until it is dropped.
 #[derive(Debug)]
@@ -32,40 +74,28 @@ pub struct RunFolder {
     record: Option<&'static str>,
     is_new: bool,
     lock: Option<FolderLock>,
-    /// What a signal removes: the lock, and the folder if it is new and empty.
-    live: Vec<Live>,
+    /// What a signal removes if it is empty.
+    live: Option<Live>,
 }
 
 impl RunFolder {
-    /// Opens a folder for a run that leaves this record, and creates it if needed. Hidden files of killed runs are
+    /// Opens a folder for a run that leaves this record, if any, and creates it if needed. Hidden files of killed runs are
     /// removed.
     ///
     /// # Errors
-    /// [`Error::Busy`] if another process writes it; [`Error::Usage`] if it holds another verb's run, or unlisted files
-    /// with the names of this run's; [`Error::Input`] for a link in the place of lock or record; [`Error::Io`].
-    pub fn open(dir: &Path, record: &'static str) -> Result<RunFolder> {
-        let mut folder = RunFolder::take(dir, Some(record), FolderLock::acquire)?;
-        folder.enter_lock();
-        folder.refuse_another_verb(record)?;
-        let usual_files = RECORDS.iter().filter(|(name, _)| *name == record).flat_map(|(_, files)| *files);
-        folder.refuse_foreign(usual_files.copied().chain([record]))?;
-        Ok(folder)
-    }
-
-    /// Like [`RunFolder::open`], for files that are independent results, without a record.
-    ///
-    /// # Errors
-    /// As [`RunFolder::open`].
-    pub fn open_without_record(dir: &Path) -> Result<RunFolder> {
-        let mut folder = RunFolder::take(dir, None, FolderLock::acquire)?;
-        folder.enter_lock();
+    /// [`Error::Busy`] if another process writes it; [`Error::Usage`] if it is neither empty nor ours, holds another
+    /// verb's run, or a result that was changed since; [`Error::Input`] for a link in the place of lock or list;
+    /// [`Error::Io`].
+    pub fn open(dir: &Path, record: impl Into<Option<&'static str>>) -> Result<RunFolder> {
+        let folder = RunFolder::take(dir, record.into(), FolderLock::acquire)?;
+        folder.former()?;
         Ok(folder)
     }
 
     /// Like [`RunFolder::open`], for a part of a run, together with other parts.
     ///
     /// # Errors
-    /// As [`RunFolder::open`]; [`Error::Busy`] only if a whole run or a merge is active.
+    /// [`Error::Busy`] only if a whole run or a merge is active; [`Error::Input`] as [`RunFolder::open`]; [`Error::Io`].
     pub fn share(dir: &Path) -> Result<RunFolder> {
         RunFolder::take(dir, None, FolderLock::share)
     }
@@ -74,16 +104,11 @@ impl RunFolder {
         let is_new = !dir.exists();
         make_folder(dir)?;
         let lock = Some(lock(&dir.join(LOCK))?);
-        let live = if is_new { vec![Live::enter(dir.to_path_buf())] } else { Vec::new() };
+        let live = is_new.then(|| Live::enter(dir.to_path_buf()));
         let folder = RunFolder { dir: dir.to_path_buf(), record, is_new, lock, live };
-        record.into_iter().chain([LIST]).try_for_each(|name| refuse_link(&dir.join(name)))?;
+        refuse_link(&dir.join(LIST))?;
         clear_stale(dir, None);
         Ok(folder)
-    }
-
-    /// Registers an exclusive lock for removal by a signal.
-    fn enter_lock(&mut self) {
-        self.live.push(Live::enter(self.dir.join(LOCK)));
     }
 
     /// Path of the folder.
@@ -98,55 +123,49 @@ impl RunFolder {
     pub fn results(&self) -> Result<Results<'_>> {
         // It existed before the work. If it vanished meanwhile, create it anew to save the result.
         make_folder(&self.dir)?;
-        let (kept, named) = (BTreeSet::new(), BTreeSet::new());
         let (staged, sha256, elsewhere) = (Vec::new(), BTreeMap::new(), Vec::new());
-        Ok(Results { folder: self, staged, sha256, elsewhere, kept, named })
+        Ok(Results { folder: self, staged, sha256, elsewhere, named: BTreeSet::new() })
     }
 
-    fn refuse_another_verb(&self, record: &str) -> Result<()> {
-        let is_one = |name: &str| RECORDS.iter().any(|(record, _)| *record == name);
-        let of_another = |run: &&RunFiles| {
-            let other = run.record.as_deref().unwrap_or_default();
-            is_one(record) && is_one(other) && other != record
+    /// The list of the former run, or of one that ended during renaming, with the files that exist. A folder that is
+    /// not ours must be empty.
+    fn former(&self) -> Result<FileList> {
+        let Some(mut list) = FileList::read(&self.dir) else {
+            let entries = std::fs::read_dir(&self.dir).map_err(|e| Error::io(&self.dir, "read", e))?;
+            let names = entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned());
+            let is_work = |name: &String| name.starts_with('.') || WORK.iter().any(|end| name.ends_with(end));
+            return match names.filter(|name| !is_work(name)).min() {
+                Some(name) if !self.dir.join(PLAN).exists() => {
+                    Err(self.refusal(&format!("it holds {name} and no {LIST}")))
+                }
+                _ => Ok(FileList::default()),
+            };
         };
-        if let Some(run) = FileList::read(&self.dir).runs.iter().find(of_another) {
-            let other = run.record.as_deref().unwrap_or_default();
-            let problem = format!("it holds the results of another verb, those of {other}");
-            let help = "give another option `out`: both would write files of the same names";
-            return Err(Error::usage(Place::file(&self.dir), problem, help));
+        if list.record.as_deref() != self.record {
+            let record = list.record.map_or(String::new(), |record| format!(", those of {record}"));
+            return Err(self.refusal(&format!("it holds the results of another verb{record}")));
         }
-        Ok(())
+        list.files.retain(|(name, _)| self.dir.join(name).symlink_metadata().is_ok());
+        for (name, _) in &list.files {
+            let path = self.dir.join(name);
+            refuse_link(&path)?;
+            input_file::claim_output(&path)?;
+            if !list.files.contains(&(name.clone(), input_file::sha256(&path)?)) {
+                return Err(self.refusal(&format!("{name} was changed after lanesweep wrote it")));
+            }
+        }
+        Ok(list)
     }
 
-    /// Refuses to replace files that no run in this folder wrote.
-    fn refuse_foreign<'n>(&self, names: impl Iterator<Item = &'n str>) -> Result<()> {
-        let list = FileList::read(&self.dir);
-        let is_foreign = |name: &&str| !list.holds(name) && self.dir.join(name).symlink_metadata().is_ok();
-        let Some(name) = { names }.find(is_foreign) else { return Ok(()) };
-        refuse_link(&self.dir.join(name))?;
-        let problem = format!("it would be overwritten, and {LIST} does not list it as a result of an earlier run");
-        let help = "move it away, or give another option `out`";
-        Err(Error::usage(Place::file(self.dir.join(name)), problem, help))
-    }
-
-    /// The files that the former run left, including those of a run that ended during renaming.
-    fn former(&self) -> BTreeSet<String> {
-        FileList::read(&self.dir).take(self.record).files.into_iter().collect()
-    }
-
-    /// Writes the list of this folder's run.
-    fn list(&self, files: BTreeSet<String>, is_complete: bool) -> Result<()> {
-        let mut list = FileList::read(&self.dir);
-        list.take(self.record);
-        let record = self.record.map(str::to_owned);
-        list.runs.push(RunFiles { record, files: files.into_iter().collect(), is_complete });
-        list.write(&self.dir)
+    fn refusal(&self, problem: &str) -> Error {
+        let help = "give a new or empty folder; a run replaces only what an earlier one left as it was";
+        Error::usage(Place::file(&self.dir), problem, help)
     }
 }
 
 impl Drop for RunFolder {
     fn drop(&mut self) {
-        self.live.clear();
+        self.live = None;
         self.lock = None;
         if self.is_new {
             // A failed run leaves no new folder: this removes only an empty one.
@@ -170,7 +189,6 @@ pub struct Results<'a> {
     staged: Vec<(String, StagedFile)>,
     sha256: BTreeMap<String, String>,
     elsewhere: Vec<StagedFile>,
-    kept: BTreeSet<String>,
     /// Files in this folder whose paths the user gave; they may replace any file.
     named: BTreeSet<String>,
 }
@@ -203,28 +221,24 @@ impl Results<'_> {
         Ok(())
     }
 
-    /// Adds a complete file that a user named, in this folder or elsewhere.
-    pub fn join(&mut self, file: StagedFile) {
-        let is_inside = folder_of(file.target()).canonicalize().ok() == self.folder.dir.canonicalize().ok();
-        match file.target().file_name().and_then(|name| name.to_str()) {
-            Some(name) if is_inside => {
-                self.named.insert(name.to_owned());
-                self.staged.push((name.to_owned(), file));
-            }
-            _ => self.elsewhere.push(file),
-        }
+    /// Adds a complete file of this folder.
+    pub fn add_staged(&mut self, file: StagedFile) {
+        self.staged.push((file_name(file.target()), file.closed()));
     }
 
-    /// Keeps the former run's files of these names as files of this run.
-    pub fn keep(&mut self, is_kept: impl Fn(&str) -> bool) {
-        let is_there = |name: &String| is_kept(name) && self.folder.dir.join(name).is_file();
-        self.kept = self.folder.former().into_iter().filter(is_there).collect();
+    /// Adds a complete file that a user named, in this folder or elsewhere.
+    pub fn join(&mut self, file: StagedFile) {
+        if folder_of(file.target()).canonicalize().ok() == self.folder.dir.canonicalize().ok() {
+            self.named.insert(file_name(file.target()));
+            self.add_staged(file);
+        } else {
+            self.elsewhere.push(file);
+        }
     }
 
     /// The sorted names of all files in the folder.
     pub fn names(&self) -> Vec<String> {
-        let names = self.staged.iter().map(|(name, _)| name);
-        names.chain(&self.kept).cloned().collect::<BTreeSet<String>>().into_iter().collect()
+        self.staged.iter().map(|(name, _)| name.clone()).collect::<BTreeSet<String>>().into_iter().collect()
     }
 
     /// All files in the folder, for the record.
@@ -235,65 +249,57 @@ impl Results<'_> {
     /// Replaces the former run's results by these; the record is renamed last.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Usage`] for two files of one name, or an unlisted file in the way.
+    /// As [`Results::publish_all`].
     pub fn publish(mut self, record: &[u8]) -> Result<()> {
-        let names: BTreeSet<String> = self.names().into_iter().collect();
-        let (folder, dir) = (self.folder, &self.folder.dir);
-        let Some(name) = folder.record else {
+        let Some(name) = self.folder.record else {
             return Err(Error::Internal("a folder without a record was to get one".to_owned()));
         };
-        let mut seen = BTreeSet::from([name]);
-        if let Some((doubled, _)) = self.staged.iter().find(|(name, _)| !seen.insert(name)) {
-            let problem = "it would be overwritten: it is a result of this run";
-            return Err(Error::usage(Place::file(dir.join(doubled)), problem, "choose another path"));
-        }
-        self.refuse_foreign([name])?;
-        let mut last = AtomicFile::create_inside(&dir.join(name))?;
-        last.append(record)?;
-        let last = last.stage()?;
-        let stale: Vec<String> = folder.former().into_iter().filter(|file| !names.contains(file)).collect();
-        folder.list(names.iter().chain(&stale).cloned().collect(), false)?;
-        remove_file(&dir.join(name))?;
-        sync_folder(dir);
-        stale.iter().try_for_each(|file| remove_file(&dir.join(file)))?;
-        self.elsewhere.drain(..).try_for_each(StagedFile::publish)?;
-        self.staged.drain(..).try_for_each(|(_, file)| file.place())?;
-        sync_folder(dir);
-        last.publish()?;
-        folder.list(names, true)
+        self.add(name, record)?;
+        self.publish_all()
     }
 
-    /// Renames the files beside those of earlier runs, without a record.
+    /// The same, where each file is a result by itself.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Usage`] for an unlisted file in the way.
-    pub fn publish_each(self) -> Result<()> {
-        self.refuse_foreign([])?;
-        let folder = self.folder;
-        let mut files = folder.former();
-        files.extend(self.names());
-        folder.list(files, true)?;
+    /// [`Error::Io`]; [`Error::Usage`] for two files of one name, or a file of the user's in the way.
+    pub fn publish_all(mut self) -> Result<()> {
+        let (folder, dir) = (self.folder, &self.folder.dir);
+        let former = folder.former()?;
+        let mut list = FileList { record: folder.record.map(str::to_owned), files: BTreeSet::new(), is_complete: true };
+        for (name, file) in &self.staged {
+            let is_ours = former.holds(name) || self.named.contains(name) || dir.join(name).symlink_metadata().is_err();
+            if !is_ours || list.holds(name) {
+                let problem = "it would be overwritten, and is no result of an earlier run";
+                return Err(Error::usage(Place::file(dir.join(name)), problem, "choose another name or folder"));
+            }
+            let sha256 = self.sha256.remove(name).map_or_else(|| file.sha256(), Ok)?;
+            list.files.insert((name.clone(), sha256));
+        }
+        let both = former.files.union(&list.files).cloned().collect();
+        FileList { record: list.record.clone(), files: both, is_complete: false }.write(dir)?;
+        folder.record.map_or(Ok(()), |record| remove_file(&dir.join(record)))?;
+        sync_folder(dir);
+        let stale = former.files.iter().filter(|(name, _)| !list.holds(name));
+        stale.map(|(name, _)| dir.join(name)).try_for_each(|path| remove_file(&path))?;
+        self.elsewhere.into_iter().try_for_each(StagedFile::publish)?;
+        let last = self.staged.pop();
         self.staged.into_iter().try_for_each(|(_, file)| file.place())?;
-        sync_folder(&folder.dir);
-        Ok(())
-    }
-
-    fn refuse_foreign<const N: usize>(&self, record: [&str; N]) -> Result<()> {
-        let staged = self.staged.iter().map(|(name, _)| name.as_str()).filter(|name| !self.named.contains(*name));
-        self.folder.refuse_foreign(staged.chain(record))
+        sync_folder(dir);
+        last.map_or(Ok(()), |(_, file)| file.publish())?;
+        list.write(dir)
     }
 }
 
-/// Whether this is a result of a run in the folder, or its record.
+/// Whether this is a result of the run in the folder.
 pub fn is_listed(dir: &Path, name: &str) -> bool {
-    FileList::read(dir).holds(name)
+    FileList::read(dir).is_some_and(|list| list.holds(name))
 }
 
-/// The files of runs that ended during renaming; `None` if all runs are complete.
+/// The files of a run that ended during renaming; `None` if it is complete.
 pub fn unfinished(dir: &Path) -> Option<Vec<String>> {
-    let is_cut = |run: &RunFiles| !run.is_complete && run.record.as_ref().is_some_and(|name| !dir.join(name).exists());
-    let cut: Vec<RunFiles> = FileList::read(dir).runs.into_iter().filter(is_cut).collect();
-    (!cut.is_empty()).then(|| cut.into_iter().flat_map(|run| run.files).collect())
+    let is_cut =
+        |list: &FileList| !list.is_complete && list.record.as_ref().is_some_and(|name| !dir.join(name).exists());
+    Some(FileList::read(dir).filter(is_cut)?.files.into_iter().map(|(name, _)| name).collect())
 }
 
 #[cfg(test)]
@@ -305,11 +311,10 @@ mod tests {
         RunFolder::open(dir, MAP_RECORD).unwrap()
     }
 
-    fn publish(folder: &RunFolder, names: &[&str], text: &str) {
+    fn publish(folder: &RunFolder, names: &[&str], text: &str) -> Result<()> {
         let mut results = folder.results().unwrap();
         names.iter().for_each(|name| results.add(name, text.as_bytes()).unwrap());
-        let record = serde_json::json!({"program": "lanesweep 0", "files": results.names(), "text": text});
-        results.publish(record.to_string().as_bytes()).unwrap();
+        if folder.record.is_some() { results.publish(text.as_bytes()) } else { results.publish_all() }
     }
 
     fn names(dir: &Path) -> Vec<String> {
@@ -321,60 +326,44 @@ mod tests {
 
     #[test]
     fn a_run_takes_the_place_of_the_one_before_and_nothing_else() {
-        let dir = tempfile::tempdir().unwrap();
-        let out = dir.path().join("out");
-        fs::create_dir(&out).unwrap();
-        fs::write(out.join("map-of-germany.svg"), "mine").unwrap();
-        publish(&folder(&out), &["a.csv", "b.svg"], "first");
-        publish(&folder(&out), &["b.svg", "c.csv"], "second");
-        assert_eq!(names(&out), ["b.svg", "c.csv", LIST, "map-of-germany.svg", "map.json"]);
-        assert_eq!(fs::read_to_string(out.join("b.svg")).unwrap(), "second");
-        assert!(is_listed(&out, "b.svg") && is_listed(&out, "map.json") && !is_listed(&out, "map-of-germany.svg"));
-    }
-
-    fn refusal(result: Result<RunFolder>) -> String {
-        let error = result.unwrap_err();
-        assert!(matches!(error, Error::Usage { .. } | Error::Input { .. }), "{error}");
-        error.to_string()
-    }
-
-    #[test]
-    fn what_a_foreign_record_names_stays_and_the_record_is_refused_by_name() {
-        let dir = tempfile::tempdir().unwrap();
-        let out = dir.path();
-        fs::write(out.join("a.csv"), "mine").unwrap();
-        let foreign = r#"{"program":"QGIS 3","files":["a.csv"]}"#;
-        fs::write(out.join(MAP_RECORD), foreign).unwrap();
-        assert!(refusal(RunFolder::open(out, MAP_RECORD)).contains(MAP_RECORD));
-        assert_eq!(fs::read_to_string(out.join(MAP_RECORD)).unwrap(), foreign);
-        fs::remove_file(out.join(MAP_RECORD)).unwrap();
-        fs::write(out.join("report.html"), "mine").unwrap();
-        assert!(refusal(RunFolder::open(out, MAP_RECORD)).contains("report.html"), "before the work starts");
-        fs::remove_file(out.join("report.html")).unwrap();
-        let folder = folder(out);
-        let mut results = folder.results().unwrap();
-        results.add("a.csv", b"text").unwrap();
-        let error = results.publish(b"{}").unwrap_err();
-        assert!(error.to_string().contains("a.csv") && error.to_string().contains("does not list it"), "{error}");
-        assert_eq!(names(out), ["a.csv", LOCK]);
-        assert_eq!(fs::read_to_string(out.join("a.csv")).unwrap(), "mine");
-    }
-
-    #[test]
-    fn without_a_readable_list_the_record_tells_which_files_are_the_runs() {
-        let dir = tempfile::tempdir().unwrap();
-        let out = dir.path();
-        publish(&folder(out), &["a.csv", "b.csv"], "first");
-        fs::write(out.join("mine.csv"), "mine").unwrap();
-        let whole = fs::read_to_string(out.join(LIST)).unwrap();
-        for changed in [None, Some("{}"), Some("mine"), Some(&whole[..40]), Some(&whole.replace("a.csv", "../a.csv"))] {
-            let _ = changed.map_or_else(|| fs::remove_file(out.join(LIST)), |text| fs::write(out.join(LIST), text));
-            assert!(is_listed(out, "a.csv") && !is_listed(out, "mine.csv"), "{changed:?}");
-            publish(&folder(out), &["a.csv", "b.csv"], "second");
+        for record in [Some(MAP_RECORD), None] {
+            let dir = tempfile::tempdir().unwrap();
+            let out = &dir.path().join("out");
+            publish(&RunFolder::open(out, record).unwrap(), &["a.csv", "b.svg"], "first").unwrap();
+            fs::write(out.join("notes.txt"), "mine").unwrap();
+            publish(&RunFolder::open(out, record).unwrap(), &["b.svg", "c.csv"], "second").unwrap();
+            let expected = ["b.svg", "c.csv", LIST].into_iter().chain(record).chain(["notes.txt"]);
+            assert_eq!(names(out), expected.collect::<Vec<_>>());
+            assert_eq!(fs::read_to_string(out.join("b.svg")).unwrap(), "second");
+            assert!(is_listed(out, "b.svg") && !is_listed(out, "notes.txt"));
         }
-        fs::remove_file(out.join(LIST)).unwrap();
-        publish(&folder(out), &["b.csv"], "third");
-        assert_eq!(names(out), ["b.csv", LIST, "map.json", "mine.csv"]);
+    }
+
+    #[test]
+    fn a_folder_is_empty_or_ours_and_what_the_user_wrote_stays() {
+        let list = r#"{"record":"map.json","files":[["a.csv","00"]],"is_complete":true}"#;
+        let outside = list.replace("a.csv", "../a.csv");
+        let record = r#"{"program":"lanesweep 0.2.0","files":["a.csv"]}"#;
+        for (name, text) in [("notes.txt", "mine"), (MAP_RECORD, record), (LIST, list), (LIST, "{}"), (LIST, &outside)]
+        {
+            let dir = tempfile::tempdir().unwrap();
+            let out = dir.path();
+            fs::write(out.join("a.csv"), "mine").unwrap();
+            fs::write(out.join(name), text).unwrap();
+            let error = RunFolder::open(out, MAP_RECORD).unwrap_err();
+            assert!(matches!(error, Error::Usage { .. }) && error.to_string().contains("a.csv"), "{name}: {error}");
+            assert_eq!(fs::read_to_string(out.join("a.csv")).unwrap(), "mine");
+            assert_eq!(fs::read_to_string(out.join(name)).unwrap(), text);
+        }
+        // In a folder of ours: a changed result, and a file in the way of a new one.
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path();
+        publish(&folder(out), &["a.csv"], "first").unwrap();
+        fs::write(out.join("b.csv"), "mine").unwrap();
+        assert!(publish(&folder(out), &["b.csv"], "second").unwrap_err().to_string().contains("b.csv"));
+        fs::write(out.join("a.csv"), "mine").unwrap();
+        assert!(RunFolder::open(out, MAP_RECORD).unwrap_err().to_string().contains("a.csv was changed"));
+        assert_eq!(["a.csv", "b.csv"].map(|name| fs::read_to_string(out.join(name)).unwrap()), ["mine", "mine"]);
     }
 
     #[test]
@@ -382,41 +371,18 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path();
         // A run that ended while it replaced another: no record, files of both.
-        let cut = || {
-            let files = vec!["a.csv".to_owned(), "b.csv".to_owned()];
-            let run = RunFiles { record: Some("map.json".to_owned()), files, is_complete: false };
-            FileList::of(vec![run]).write(out).unwrap();
-        };
-        for (name, text) in [("a.csv", "first"), ("b.csv", "second"), ("other.csv", "mine")] {
-            fs::write(out.join(name), text).unwrap();
-        }
-        cut();
-        assert_eq!(unfinished(out).unwrap(), ["a.csv", "b.csv"]);
-        publish(&folder(out), &["c.csv"], "third");
-        assert_eq!(names(out), ["c.csv", LIST, "map.json", "other.csv"]);
-        // A run that already has its record is complete.
-        cut();
+        publish(&folder(out), &["a.csv", "b.csv"], "first").unwrap();
+        let mut list = FileList::read(out).unwrap();
+        fs::write(out.join("b.csv"), "second").unwrap();
+        let sha256 = input_file::sha256(&out.join("b.csv")).unwrap();
+        list.files.extend([("b.csv".to_owned(), sha256), ("c.csv".to_owned(), "00".to_owned())]);
+        FileList { is_complete: false, ..list }.write(out).unwrap();
+        // With its record it is complete.
         assert!(unfinished(out).is_none());
-    }
-
-    #[test]
-    fn files_without_a_record_stay_beside_one_another_and_replace_no_foreign_file() {
-        let dir = tempfile::tempdir().unwrap();
-        let out = dir.path();
-        let add = |name: &str, text: &str| {
-            let folder = RunFolder::open_without_record(out).unwrap();
-            let mut results = folder.results().unwrap();
-            results.add(name, text.as_bytes()).unwrap();
-            results.publish_each()
-        };
-        add("a.json", "first").unwrap();
-        add("b.json", "second").unwrap();
-        add("a.json", "third").unwrap();
-        fs::write(out.join("c.json"), "mine").unwrap();
-        assert!(add("c.json", "fourth").unwrap_err().to_string().contains("c.json"));
-        let texts: Vec<String> =
-            ["a.json", "b.json", "c.json"].map(|n| fs::read_to_string(out.join(n)).unwrap()).into();
-        assert_eq!(texts, ["third", "second", "mine"]);
+        fs::remove_file(out.join(MAP_RECORD)).unwrap();
+        assert!(unfinished(out).unwrap().contains(&"c.csv".to_owned()));
+        publish(&folder(out), &["d.csv"], "third").unwrap();
+        assert_eq!(names(out), ["d.csv", LIST, "map.json"]);
     }
 
     #[test]
@@ -426,11 +392,12 @@ mod tests {
         let held = folder(&out);
         assert!(matches!(RunFolder::open(&out, STUDY_RECORD), Err(Error::Busy { .. })));
         assert!(matches!(RunFolder::share(&out), Err(Error::Busy { .. })));
-        publish(&held, &["report.html"], "map");
+        publish(&held, &["report.html"], "map").unwrap();
         drop(held);
-        let error = RunFolder::open(&out, STUDY_RECORD).unwrap_err();
-        assert!(matches!(error, Error::Usage { .. }) && error.to_string().contains("map.json"), "{error}");
-        assert!(RunFolder::open(&out, "index.csv").is_ok(), "its files have other names");
+        for other in [Some(STUDY_RECORD), Some("index.csv"), None] {
+            let error = RunFolder::open(&out, other).unwrap_err();
+            assert!(matches!(error, Error::Usage { .. }) && error.to_string().contains("map.json"), "{error}");
+        }
     }
 
     #[test]
@@ -452,12 +419,9 @@ mod tests {
         let (out, precious) = (dir.path().join("out"), dir.path().join("precious"));
         fs::create_dir(&out).unwrap();
         fs::write(&precious, "mine").unwrap();
-        for name in [LOCK, MAP_RECORD, LIST, "a.csv"] {
+        for name in [LOCK, LIST] {
             std::os::unix::fs::symlink(&precious, out.join(name)).unwrap();
-            let refused = match RunFolder::open(&out, MAP_RECORD) {
-                Ok(folder) => folder.results().unwrap().add("a.csv", b"text").unwrap_err(),
-                Err(error) => error,
-            };
+            let refused = RunFolder::open(&out, MAP_RECORD).unwrap_err();
             assert!(refused.to_string().contains("this is a link"), "{name}: {refused}");
             fs::remove_file(out.join(name)).unwrap();
         }

@@ -118,6 +118,12 @@ fn settled(files: Files, record: &dyn Fn(&mut serde_json::Value), page: &dyn Fn(
             record(&mut value);
             content = value.to_string().into_bytes();
         }
+        if name == "lanesweep-files.json" {
+            // Checksums of record and page follow their times.
+            let mut list: serde_json::Value = serde_json::from_slice(&content).unwrap();
+            list["files"].as_array_mut().unwrap().iter_mut().for_each(|file| file[1] = serde_json::Value::Null);
+            content = list.to_string().into_bytes();
+        }
         if name == "report.html" {
             content = page(&String::from_utf8(content).unwrap()).into_bytes();
         }

@@ -37,12 +37,10 @@ const HANGS: Duration = Duration::from_secs(60);
 const HEAVY_ONE_IN: usize = 16;
 
 /// The bytes of an input, and whether it goes through the slow steps.
-fn input(n: u64, reader: &Reader, others: &[Vec<u8>], dir: &Path, seeds: &Seeds) -> (Vec<u8>, bool) {
+fn input(n: u64, reader: &Reader, others: &[Vec<u8>]) -> (Vec<u8>, bool) {
     let mut dice = Dice(n);
     let bytes = mutated(&mut dice, &reader.seeds, others);
-    let reseal = reader.reseal.filter(|_| dice.below(4) != 0);
-    let sealed = reseal.and_then(|reseal| reseal(&bytes, dir, seeds));
-    (sealed.unwrap_or(bytes), dice.below(HEAVY_ONE_IN) == 0)
+    (bytes, dice.below(HEAVY_ONE_IN) == 0)
 }
 
 /// Runs input `n`; whether it was accepted, and what is wrong, if anything.
@@ -50,7 +48,7 @@ fn run_one(n: u64, reader: &Reader, others: &[Vec<u8>], seeds: &Seeds, dir: &Pat
     memory::begin(n);
     let start = Instant::now();
     let result = catch_unwind(AssertUnwindSafe(|| {
-        let (bytes, heavy) = input(n, reader, others, dir, seeds);
+        let (bytes, heavy) = input(n, reader, others);
         (reader.read)(&bytes, dir, seeds, heavy)
     }));
     let took = start.elapsed();
@@ -67,7 +65,7 @@ fn run_one(n: u64, reader: &Reader, others: &[Vec<u8>], seeds: &Seeds, dir: &Pat
         _ => None,
     };
     let bad = bad.map(|what| {
-        let (bytes, _) = input(n, reader, others, dir, seeds);
+        let (bytes, _) = input(n, reader, others);
         let kept = std::env::temp_dir().join(format!("lanesweep-mutated-{n}"));
         let _ = std::fs::write(&kept, bytes);
         format!("input {n}, {}: {what}; its bytes: {}", reader.name, kept.display())
@@ -162,7 +160,6 @@ fn inputs_that_once_took_the_memory_or_panicked_are_refused_by_name() {
         let reader = readers.iter().find(|r| r.name == name).unwrap();
         let seed = reader.seeds.iter().find(|s| String::from_utf8_lossy(s).contains(old)).expect(old);
         let bytes = String::from_utf8_lossy(seed).replacen(old, new, 1).into_bytes();
-        let bytes = reader.reseal.and_then(|reseal| reseal(&bytes, dir.path(), &seeds)).unwrap_or(bytes);
         let error = (reader.read)(&bytes, dir.path(), &seeds, true).expect_err(new);
         assert!(error.to_string().contains(says), "{name}, {new}: {error}");
         assert!(error.help().is_some_and(|h| !h.is_empty()), "{error}");

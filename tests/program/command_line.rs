@@ -80,7 +80,7 @@ fn a_folder_that_cannot_be_used_leaves_nothing_behind() {
     std::fs::create_dir(dir.path().join("empty")).unwrap();
     std::fs::write(dir.path().join("file"), "in the way").unwrap();
     refused(dir.path(), "study empty --out out", 3, "no recording");
-    refused(dir.path(), "study no/such/folder --out out", 6, "no/such/folder");
+    refused(dir.path(), "study no/such/folder --out out", 3, "no/such/folder");
     refused(dir.path(), &format!("-q study --out file/out {SMALL}"), 6, "cannot");
     assert!(!dir.path().join("out").exists(), "nothing may be written");
 }
@@ -135,7 +135,7 @@ fn wrong_words_are_answered_with_what_to_write_instead() {
         ("study --threads 0", 2, "from 1 to 4096"),
         ("study --thw 0", 2, ""),
         ("study --models ACC", 2, ""),
-        ("study --scenarios no-such-file.jsonl", 6, "no-such-file.jsonl"),
+        ("study --scenarios no-such-file.jsonl", 3, "no-such-file.jsonl"),
         ("simulate --category cutin", 2, "use cut-in, cut-out or lvd"),
         (&format!("{lvd} --ego-speed 20m/s --gap 5 --models XYZ"), 2, "Reg157, CCHDM"),
         (&format!("{lvd} --ego-speed -3m/s --gap 5"), 2, "at least 0"),
@@ -267,7 +267,7 @@ fn an_error_stream_that_takes_nothing_does_not_end_the_work() {
         command.args(words(args)).stderr(full()).stdout(std::process::Stdio::null()).status().unwrap().code()
     };
     assert_eq!(run(&format!("{CASE} --thw 1")), Some(0));
-    assert_eq!(run("mine no-such-folder"), Some(6));
+    assert_eq!(run("mine no-such-folder"), Some(3));
     assert_eq!(run("study --synth-recordings"), Some(2));
 }
 

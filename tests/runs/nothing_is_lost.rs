@@ -27,14 +27,19 @@ fn an_output_never_replaces_an_input_or_another_result() {
     let dir = dir.path();
     ran(dir, "-q tracks --convert in --synth-recordings 1 --config generator.duration_s=60");
     let tracks = read(&dir.join("in/01_tracks.csv"));
-    refused(dir, "mine in --out in/01_tracks.csv", 2, "would be overwritten");
+    refused(dir, "mine in --out in/01_tracks.csv", 2, "no format");
     refused(dir, "study in --rows in/01_tracks.csv --out out", 2, "would be overwritten");
-    refused(dir, "tracks --convert in --synth-recordings 1", 2, "already holds `01_tracks.csv`");
+    // A folder of recordings holds no run, before and after: neither run begins.
+    for _ in 0..2 {
+        refused(dir, "study in --out in", 2, "a new or empty folder");
+    }
     assert!(read(&dir.join("in/01_tracks.csv")) == tracks);
     scenarios(dir);
     for rows in ["s.jsonl", "out/f1.csv"] {
         refused(dir, &format!("study --scenarios s.jsonl --rows {rows} --out out"), 2, "would be overwritten");
     }
+    std::fs::write(dir.join("cases.csv"), "category,ego_speed_kmh,thw_s,acceleration_mps2\nlvd,60,1,-5\n").unwrap();
+    refused(dir, "check cases.csv --profiles un-r157 --rows cases.csv", 2, "would be overwritten");
 }
 
 #[test]
@@ -71,9 +76,11 @@ fn a_foreign_index_of_exported_scenarios_and_a_file_of_their_name_stay() {
     let dir = dir.path();
     let export = "simulate --category lvd --models FSM --ego-speed 30m/s --thw 1 --acceleration=-5 --xosc .";
     std::fs::write(dir.join("a.csv"), "mine").unwrap();
-    for (name, content) in [("index.csv", "file,label\na.csv,1\n"), ("001-lvd_1s_FSM.xosc", "mine")] {
+    for (name, content, held) in
+        [("index.csv", "file,label\na.csv,1\n", "a.csv"), ("001-lvd_1s_FSM.xosc", "mine", "001-lvd_1s_FSM.xosc")]
+    {
         std::fs::write(dir.join(name), content).unwrap();
-        refused(dir, export, 2, name);
+        refused(dir, export, 2, &format!("it holds {held}"));
         assert_eq!((read(&dir.join(name)).as_str(), read(&dir.join("a.csv")).as_str()), (content, "mine"));
         std::fs::remove_file(dir.join(name)).unwrap();
     }
@@ -126,17 +133,19 @@ fn a_folder_from_somebody_else_makes_no_run_write_elsewhere() {
     scenarios(dir);
     std::fs::write(dir.join("precious"), "mine").unwrap();
     let study = "-q study --scenarios s.jsonl --categories lvd --out out";
-    for (run, name) in [
-        (study, "run.lock"),
-        (study, "f1.csv"),
-        (study, "run-plan.json"),
-        (&format!("{study} --shard 0/1"), "part-00000-of-00001.lock"),
-        (&format!("{study} --shard 0/1"), "part-00000-of-00001.journal"),
-        ("-q tracks --convert out --synth-recordings 1 --config generator.duration_s=20", "01_tracksMeta.csv"),
+    for (run, name, code) in [
+        (study, "run.lock", 3),
+        (study, "f1.csv", 2),
+        (study, "run-plan.json", 2),
+        (&format!("{study} --shard 0/1"), "part-00000-of-00001.lock", 3),
+        (&format!("{study} --shard 0/1"), "part-00000-of-00001.journal", 3),
+        ("-q tracks --convert out --synth-recordings 1 --config generator.duration_s=20", "01_tracksMeta.csv", 2),
     ] {
         std::fs::create_dir(&out).unwrap();
         std::os::unix::fs::symlink(dir.join("precious"), out.join(name)).unwrap();
-        refused(dir, run, 3, "this is a link");
+        // A folder that is not ours holds nothing of a run: any file there ends it.
+        let held = format!("it holds {name}");
+        refused(dir, run, code, if code == 2 { &held } else { "this is a link" });
         assert_eq!(read(&dir.join("precious")), "mine", "{run}, {name}");
         std::fs::remove_dir_all(&out).unwrap();
     }
@@ -269,7 +278,7 @@ fn converted_recordings_of_one_name_stay_apart_and_made_up_and_replace_no_file()
     // A file of the user's with the name of one of them.
     std::fs::create_dir(&out).unwrap();
     std::fs::write(out.join("03_tracksMeta.csv"), "mine").unwrap();
-    refused(dir, convert, 2, "already holds `03_tracksMeta.csv`");
+    refused(dir, convert, 2, "it holds 03_tracksMeta.csv");
     assert_eq!(program::files(&out).get("03_tracksMeta.csv").unwrap(), b"mine");
     std::fs::remove_file(out.join("03_tracksMeta.csv")).unwrap();
     ran(dir, convert);
@@ -285,5 +294,9 @@ fn converted_recordings_of_one_name_stay_apart_and_made_up_and_replace_no_file()
     let (v1, v2, all) = (mined("v1"), mined("v2"), mined("out"));
     assert_eq!(all.len(), v1.len() + v2.len());
     assert!(all.iter().all(is_synthetic));
-    refused(dir, convert, 2, "already holds");
+    // A second conversion replaces the first, unless somebody else wrote there.
+    ran(dir, "-q tracks v1 --convert out");
+    assert!(out.join("02_tracks.csv").exists() && !out.join("03_tracks.csv").exists());
+    std::fs::write(out.join("01_tracks.csv"), "mine").unwrap();
+    refused(dir, convert, 2, "01_tracks.csv was changed");
 }

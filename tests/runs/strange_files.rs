@@ -212,7 +212,7 @@ fn no_message_repeats_a_text_of_any_size() {
         ("study --categories @", 2, "no category"),
         ("study --config @=1", 2, "key"),
         ("study --dt @", 2, "--dt"),
-        ("study @", 6, "cannot read"),
+        ("study @", 3, "cannot read"),
         ("study --device @", 2, "--device"),
         ("study --@", 2, "unexpected argument"),
         ("@", 2, "unrecognized subcommand"),
@@ -257,7 +257,7 @@ fn foreign_text_reaches_a_terminal_as_text_and_never_as_commands_to_it() {
         ("simulate --scenarios s.jsonl --lane @", "\u{1b}[2J/S/1.2s/FSM", 2),
         ("study --scenarios s.jsonl --backend cpu --config study.compare_reference=true", "", 0),
         ("study --scenarios broken.jsonl", "", 3),
-        ("study --scenarios @", named, 6),
+        ("study --scenarios @", named, 3),
         ("study --profile key.toml", "", 2),
         ("study @", "--\u{1b}[2J\u{202e}", 2),
     ] {

@@ -121,7 +121,7 @@ fn wrong_words_are_answered_with_what_to_write_instead() {
         ("--hours -1", 2, "--hours"),
         ("--km nan", 2, "--km"),
         ("--out one.json", 2, "is one file, but 19 densities"),
-        ("--scenarios no-such-file.jsonl", 6, "no-such-file.jsonl"),
+        ("--scenarios no-such-file.jsonl", 3, "no-such-file.jsonl"),
         ("--scenarios input.json --parameterizations i --out input.json", 2, "would be overwritten"),
     ] {
         refused(dir.path(), &format!("fit {flags}"), code, hint);

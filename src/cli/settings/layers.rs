@@ -98,7 +98,6 @@ pub(crate) struct Setting<'a> {
 pub(crate) struct Layers {
     keys: Vec<Key>,
     values: BTreeMap<String, (Option<Value>, Origin)>,
-    files: Vec<PathBuf>,
 }
 
 impl Default for Layers {
@@ -112,7 +111,7 @@ impl Layers {
     pub(crate) fn defaults() -> Layers {
         let keys = keys_in_order();
         let values = keys.iter().map(|key| (key.name.clone(), (key.default.clone(), Origin::Default))).collect();
-        Layers { keys, values, files: Vec::new() }
+        Layers { keys, values }
     }
 
     /// Reads the files and assignments of `--config`, in this order. Without a file among them, it reads the one named by
@@ -135,7 +134,6 @@ impl Layers {
             for line in file::read(&path, &layers.keys)? {
                 layers.set(&line.key, line.value, Origin::File { path: path.clone(), row: line.row });
             }
-            layers.files.push(path);
         }
         for one in typed {
             if let Assignment::Value(text) = one {
@@ -210,11 +208,6 @@ impl Layers {
     /// One key.
     pub(crate) fn get(&self, name: &str) -> Option<Setting<'_>> {
         self.list().find(|setting| setting.key.name == name)
-    }
-
-    /// The files that were read.
-    pub(crate) fn files(&self) -> &[PathBuf] {
-        &self.files
     }
 
     /// The values as a tree of tables.

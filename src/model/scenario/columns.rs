@@ -210,12 +210,12 @@ pub(super) const HELP: &str = "the chapter on tables lists the columns (docs/src
 ///
 /// # Errors
 /// [`Error::Input`] for a column in an unusable unit, for two columns of one field, and for an unknown name close to
-/// that of a missing field. If `others` are not allowed, for every unknown column.
+/// that of a missing field, and for a table of lanes if it is refused.
 pub(super) fn choose(
     table: &mut TableReader,
     known: &[Named],
     field_of: impl Fn(usize) -> usize,
-    others_are_let_be: bool,
+    takes_lanes: bool,
 ) -> Result<Vec<Chosen>> {
     let mut chosen: Vec<Chosen> = Vec::new();
     let mut unknown = Vec::new();
@@ -238,20 +238,24 @@ pub(super) fn choose(
     }
     // A lane has a verdict per criterion; a scenario does not.
     let is_lane_table = ["collision", "ttc"].iter().all(|name| unknown.iter().any(|column| column == name));
-    if is_lane_table && !others_are_let_be {
+    if is_lane_table && !takes_lanes {
         let help = "give a scenario file, such as `lanesweep mine` writes";
         return Err(Error::input(table.header(), "this is a table of lanes, not of scenarios", help));
     }
+    let mut unused = Vec::new();
     for column in unknown {
         let missing = (0..known.len()).filter(|&at| !chosen.iter().any(|other| other.field == field_of(at)));
         let near = nearest(column, missing.map(|at| known[at].name.as_str()));
         let help = match near {
             Some(near) => format!("did you mean `{near}`? {HELP}"),
-            None if others_are_let_be => continue,
-            None => format!("remove it; {HELP}"),
+            None => {
+                unused.push(column.as_str());
+                continue;
+            }
         };
         return Err(Error::input(table.header().column(column), "there is no such column", help));
     }
+    table.tell_unused(&unused);
     let at: Vec<usize> = chosen.iter().map(|column| column.at).collect();
     table.rows.want(&at)?;
     Ok(chosen)

@@ -38,7 +38,7 @@ const READ: [TableFormat; 3] = [TableFormat::JsonLines, TableFormat::Parquet, Ta
 /// width or sample rate that is not above 0, a value outside the physical range unless accepted, a kept cut-out without
 /// the vehicle ahead or its gap, a repeated id, a file without scenarios, or a damaged file.
 pub fn read_scenario_file(path: &Path, implausible: Implausible) -> Result<ScenarioFile> {
-    match TableFormat::of(path, &READ, "the scenario file")? {
+    match TableFormat::of(&input_file::plain_name(path), &READ, "the scenario file")? {
         TableFormat::JsonLines => read_json_lines(path, implausible),
         format => table_reader::read(path, format, implausible),
     }
@@ -119,7 +119,7 @@ fn cell(value: &Value, kind: ColumnKind) -> Option<Cell<'_>> {
 
 /// Reads a scenario file. A byte-order mark, Windows line ends and empty lines are accepted.
 fn read_json_lines(path: &Path, implausible: Implausible) -> Result<ScenarioFile> {
-    let file = input_file::open(path)?;
+    let file = input_file::open_text(path)?;
     let mut reader = BufReader::with_capacity(1 << 16, file);
     let mut found = ScenariosRead::new(implausible, "remove one of the two lines, or rename one scenario");
     let mut line = Vec::new();

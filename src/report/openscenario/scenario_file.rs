@@ -250,8 +250,8 @@ fn identifier(name: &str) -> String {
     if plain.starts_with(|c: char| c.is_ascii_digit()) { format!("_{plain}") } else { plain }
 }
 
-/// File name of the index.
-const INDEX: &str = "index.csv";
+/// File name of the index, the record of an export.
+pub const INDEX: &str = "index.csv";
 
 /// One line of the index.
 #[derive(Debug, Clone, PartialEq)]

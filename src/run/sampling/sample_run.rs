@@ -7,9 +7,10 @@ use super::estimate_rows::crude_rows;
 use super::plan_file::SEARCH_FILE;
 use super::result::SampleResult;
 use super::weighted::WeightedTally;
-use super::{Sample, SampleKind, Weighted};
+use super::{Sample, SampleHeadways, SampleKind, Weighted};
 use crate::engine::{Executor, LanePlan, SampleTally, SweepSummary};
 use crate::run::parts::{Computed, EachChunk, Job, Ledger, MergeableCounts, PLAN_FILE, Shard, leave_plan};
+use crate::stats::density::Exposure;
 use crate::support::files::remove_file;
 use crate::support::run_folder::ESTIMATE_RECORD;
 use crate::{Error, Place, Result};
@@ -47,6 +48,11 @@ pub struct WeightedJob<'s> {
 }
 
 impl Sample {
+    /// The exposure, if the density draws the headway: lanes that begin at imposed headways have no rate per hour.
+    pub(super) fn exposure(&self) -> Option<&Exposure> {
+        self.density.exposure.as_ref().filter(|_| matches!(self.options.headways, SampleHeadways::Sampled))
+    }
+
     /// The job of the estimator.
     ///
     /// # Errors
@@ -130,12 +136,12 @@ impl Job for CrudeJob<'_> {
         executor: &Executor,
         each: Option<&mut EachChunk>,
     ) -> Result<Computed> {
-        let (options, exposure) = (&self.sample.options, self.sample.density.exposure.as_ref());
+        let (options, exposure) = (&self.sample.options, self.sample.exposure());
         sample_into(self.plan, ledger, executor, options, exposure, each)
     }
 
     fn result(&self, counts: Vec<SampleTally>, computed: Computed, place: Place) -> Result<SampleResult> {
-        let (options, exposure) = (&self.sample.options, self.sample.density.exposure.as_ref());
+        let (options, exposure) = (&self.sample.options, self.sample.exposure());
         let run = crude_of_segments(self.plan, counts, options, exposure)?;
         if options.stop.is_fixed() && run.tally.samples() != self.unit_count() {
             let problem = "the parts do not hold every sample that their names stand for";

@@ -111,7 +111,7 @@ impl Sample {
         tally: Option<WeightedTally>,
         place: Place,
     ) -> Result<SampleResult> {
-        let (options, exposure) = (&self.options, self.density.exposure.as_ref());
+        let (options, exposure) = (&self.options, self.exposure());
         let all = 0..self.samples();
         let Some(tally) = tally.filter(|tally| tally.covered().as_slice() == std::slice::from_ref(&all)) else {
             let problem = "the parts do not hold every sample";

@@ -1,8 +1,8 @@
 //! The density file: one JSON object, readable by people, lossless for every f64, with a version and a SHA-256
 //! over its content.
 //!
-//! The SHA-256 is that of the same object as compact JSON in the order of [`File`], with an empty
-//! `content_sha256`: white space may change, numbers may not.
+//! The SHA-256 is that of the same object as compact JSON in the order of [`File`], with an empty `content_sha256`. It
+//! names the density in records; reading calculates it anew, so a file may be edited.
 
 use std::ops::RangeInclusive;
 use std::path::Path;
@@ -255,14 +255,6 @@ impl DensityModel {
     pub fn from_json(text: &[u8], place: &Place) -> Result<DensityModel> {
         check_version(text, place)?;
         let file: File = serde_json::from_slice(text).map_err(|e| broken(place, &e))?;
-        let hash = file.hash()?;
-        if hash != file.content_sha256 {
-            return Err(Error::input(
-                place.clone().column("content_sha256"),
-                format!("is {}, but the content has {hash}: it was changed after it was written", file.content_sha256),
-                REFIT,
-            ));
-        }
         file.model(place)
     }
 }
@@ -309,8 +301,7 @@ fn broken(place: &Place, error: &serde_json::Error) -> Error {
 ///
 /// # Errors
 /// [`Error::Io`] if it cannot be read; [`Error::Input`] naming file, line or field: not JSON, another version, a
-/// missing or unknown field, a number that is not finite, lengths that do not fit, a content that does not have
-/// the SHA-256 in the file, or more than [`MAX_FILE_BYTES`].
+/// missing or unknown field, a number that is not finite, lengths that do not fit, or more than [`MAX_FILE_BYTES`].
 pub fn read_density(path: &Path) -> Result<DensityModel> {
     let bytes = std::fs::metadata(path).map_err(|e| Error::io(path, "read", e))?.len();
     if bytes > MAX_FILE_BYTES {

@@ -227,13 +227,32 @@ impl Trust {
         }
     }
 
-    /// The verdict on the data: `enough` scenarios fail, `few` do, or they are `left out` of the interval.
+    /// The verdict on the data: `enough` scenarios fail, `few` or `none` do, or they are `left out` of the interval.
     pub fn data(&self) -> &'static str {
         match self.of(Uncertain::Data).next() {
+            _ if self.warnings.contains(&Warning::NoFailures) => "none",
             None => "enough",
             Some(Warning::DataLeftOut) => "left out",
             Some(_) => "few",
         }
+    }
+
+    /// What the estimate may be used for.
+    pub fn usable(&self) -> String {
+        let few = self.warnings.iter().find_map(|warning| match warning {
+            Warning::FewScenarios { scenarios } => Some(*scenarios),
+            _ => None,
+        });
+        let whose = match (few, self.density()) {
+            _ if self.draws() == Verdict::Unusable => return "for nothing: the sample missed too much".to_owned(),
+            _ if self.data() == "none" => return "as an upper bound only".to_owned(),
+            (Some(scenarios), _) if scenarios < 2.0 => "carried by one scenario".to_owned(),
+            (Some(scenarios), _) => format!("carried by {:.0} scenarios", scenarios.floor()),
+            (None, "agrees") => "as the recordings' rate".to_owned(),
+            (None, "differs") => "as this density's rate: the recordings differ".to_owned(),
+            _ => "as this density's rate alone".to_owned(),
+        };
+        if self.draws() == Verdict::Sound { whose } else { whose + ", few draws" }
     }
 
     fn of(&self, about: Uncertain) -> impl Iterator<Item = &Warning> {
@@ -283,8 +302,12 @@ mod tests {
         let of = |warnings: Vec<Warning>| Trust { warnings };
         let none = of(vec![]);
         assert_eq!((none.draws(), none.density(), none.data()), (Verdict::Sound, "agrees", "enough"));
+        assert_eq!(none.usable(), "as the recordings' rate");
+        let bound = of(vec![Warning::NoFailures, Warning::NotCompared]);
+        assert_eq!((bound.data(), bound.usable()), ("none", "as an upper bound only".to_owned()));
         let few = of(vec![Warning::FewScenarios { scenarios: 2.0 }, Warning::NotCompared]);
         assert_eq!((few.draws(), few.density(), few.data()), (Verdict::Sound, "open", "few"));
+        assert_eq!(few.usable(), "carried by 2 scenarios");
         assert_eq!(of(vec![Warning::FewFailures { failures: 3 }]).draws(), Verdict::Doubtful);
         assert_eq!(of(vec![Warning::OneWeightDominates { share: 0.3 }]).draws(), Verdict::Doubtful);
         assert_eq!(

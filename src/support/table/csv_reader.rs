@@ -1,7 +1,6 @@
 //! Rows of a CSV file, one at a time.
 
-use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{BufReader, Cursor, Read};
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
@@ -13,17 +12,20 @@ use crate::{Error, Place, Result};
 
 /// Maximum row length, bytes. A quote that is never closed makes the rest of the file one row.
 const MAX_ROW_BYTES: u64 = 16 << 20;
+/// What separates the fields is seen in the first bytes.
+const START_BYTES: u64 = 1 << 16;
 
 pub(super) struct CsvRows {
     path: PathBuf,
     reader: csv::Reader<BudgetedFile>,
     record: csv::StringRecord,
     wanted: Vec<usize>,
+    decimal_commas: bool,
 }
 
 /// A file that returns an error after a budget of bytes.
 struct BudgetedFile {
-    file: BufReader<File>,
+    file: BufReader<Box<dyn Read + Send>>,
     left: u64,
 }
 
@@ -38,23 +40,50 @@ impl Read for BudgetedFile {
     }
 }
 
+/// The delimiter that the first line has most of; a comma if it has none.
+pub fn delimiter_of(start: &[u8]) -> u8 {
+    let line = start.split(|&byte| byte == b'\n').next().unwrap_or_default();
+    let count = |delimiter: &u8| line.iter().filter(|&byte| byte == delimiter).count();
+    [b'|', b'\t', b';', b','].into_iter().max_by_key(count).unwrap_or(b',')
+}
+
+/// Whether more fields of the first lines look like numbers with a decimal comma than with a point, as names of lanes may (`1.2`).
+pub fn has_decimal_commas(start: &[u8], delimiter: u8) -> bool {
+    let is_decimal = |field: &[u8], mark: u8| {
+        let field = field.trim_ascii();
+        let digits = field.strip_prefix(b"-").unwrap_or(field);
+        let is_number = digits.iter().all(|byte| byte.is_ascii_digit() || *byte == mark);
+        is_number && digits.iter().filter(|byte| **byte == mark).count() == 1 && digits.len() > 1
+    };
+    let fields = start.split(|byte| *byte == b'\n' || *byte == delimiter).map(|field| {
+        let field = field.trim_ascii();
+        field.strip_prefix(b"\"").and_then(|inner| inner.strip_suffix(b"\"")).unwrap_or(field)
+    });
+    let count = |mark| fields.clone().filter(|field| is_decimal(field, mark)).count();
+    count(b',') > count(b'.')
+}
+
+/// Whether a text is a number with a decimal comma, and perhaps a unit.
+fn is_decimal_comma(text: &str) -> bool {
+    let is_whole = |left: &str| left.trim_start_matches(['+', '-']).bytes().all(|byte| byte.is_ascii_digit());
+    text.split_once(',').is_some_and(|(left, right)| {
+        is_whole(left) && right.starts_with(|c: char| c.is_ascii_digit()) && !right.contains(',')
+    })
+}
+
 impl CsvRows {
     pub(super) fn open(path: &Path) -> Result<(Vec<String>, CsvRows)> {
-        let file = BudgetedFile { file: BufReader::new(input_file::open(path)?), left: MAX_ROW_BYTES };
-        let reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(file);
+        let (mut text, mut start) = (input_file::open_text(path)?, Vec::new());
+        text.by_ref().take(START_BYTES).read_to_end(&mut start).map_err(|e| Error::io(path, "read", e))?;
+        let delimiter = delimiter_of(&start);
+        let decimal_commas = delimiter != b',' && has_decimal_commas(&start, delimiter);
+        let file = BudgetedFile { file: BufReader::new(Box::new(Cursor::new(start).chain(text))), left: MAX_ROW_BYTES };
+        let reader = csv::ReaderBuilder::new().trim(csv::Trim::All).delimiter(delimiter).from_reader(file);
         let (path, record) = (path.to_path_buf(), csv::StringRecord::new());
-        let mut rows = CsvRows { path, reader, record, wanted: Vec::new() };
+        let mut rows = CsvRows { path, reader, record, wanted: Vec::new(), decimal_commas };
         let header = rows.reader.headers().cloned().map_err(|e| csv_error(&rows.path, e))?;
         let columns: Vec<String> =
             header.iter().map(|name| name.trim_start_matches('\u{feff}').trim().to_owned()).collect();
-        if let [one] = &columns[..]
-            && one.contains([';', '\t'])
-        {
-            let mark = if one.contains(';') { "semicolons" } else { "tabs" };
-            let problem = format!("the fields are separated by {mark}; expected commas");
-            let help = "write the table with commas and decimal points";
-            return Err(Error::input(Place::file(&rows.path).row(1), problem, help));
-        }
         rows.wanted = (0..columns.len()).collect();
         Ok((columns, rows))
     }
@@ -67,13 +96,20 @@ impl TableRows for CsvRows {
     }
 
     fn step(&mut self) -> Result<bool> {
-        self.reader.get_mut().left = MAX_ROW_BYTES;
-        self.reader.read_record(&mut self.record).map_err(|e| csv_error(&self.path, e))
+        loop {
+            self.reader.get_mut().left = MAX_ROW_BYTES;
+            let is_row = self.reader.read_record(&mut self.record).map_err(|e| csv_error(&self.path, e))?;
+            // Spreadsheets write rows of empty fields below a table.
+            if !is_row || self.record.iter().any(|field| !field.is_empty()) {
+                return Ok(is_row);
+            }
+        }
     }
 
     fn cell(&self, wanted: usize) -> Cell<'_> {
         match self.record.get(self.wanted[wanted]) {
             None | Some("") => Cell::Null,
+            Some(text) if self.decimal_commas && is_decimal_comma(text) => Cell::text(text.replacen(',', ".", 1)),
             Some(text) => Cell::text(text_of_cell(text)),
         }
     }

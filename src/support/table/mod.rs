@@ -23,6 +23,7 @@ mod writer;
 #[cfg(feature = "arrow")]
 pub use arrow::ArrowRows;
 pub use column::{Cell, Column, ColumnKind, Digits, Row, TableMetadata, TableRows};
+pub use csv_reader::{delimiter_of, has_decimal_commas};
 pub use memory::{CellValue, NamedValue, NumberText, Table, TableOf};
 pub use names::{NameUnit, Named, Resolved, nearest, resolve};
 #[cfg(feature = "parquet")]

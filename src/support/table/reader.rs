@@ -6,6 +6,7 @@ use super::csv_reader::CsvRows;
 #[cfg(feature = "parquet")]
 use super::parquet_reader::ParquetRows;
 use super::{TableFormat, TableRows};
+use crate::support::plain_text::cut_names;
 use crate::{Error, Place, Result};
 
 /// A table being read.
@@ -41,6 +42,13 @@ impl TableReader {
     /// The place of the file.
     pub fn file(&self) -> Place {
         Place::file(&self.path)
+    }
+
+    /// Names the columns that nothing reads.
+    pub fn tell_unused(&self, columns: &[&str]) {
+        if !columns.is_empty() {
+            tracing::warn!("{}: these columns are not used: {}", self.file(), cut_names(&columns.join(", ")));
+        }
     }
 
     /// The place of the header, for errors about columns.

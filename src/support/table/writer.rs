@@ -160,18 +160,30 @@ fn begins_formula(text: &str) -> bool {
     text.trim_start_matches('\'').starts_with(BEGINS_FORMULA)
 }
 
-/// Protects a text so that a spreadsheet shows it and does not compute it: `=1+1` becomes `'=1+1`. Numbers are
-/// unchanged.
-fn cell_text(text: &str) -> Cow<'_, str> {
-    match begins_formula(text) && text.parse::<f64>().is_err() {
-        true => Cow::Owned(format!("'{text}")),
-        false => Cow::Borrowed(text),
+/// The text with every piece replaced that is a field for a spreadsheet with another separator than the comma.
+fn by_pieces<'a>(text: &'a str, of: impl Fn(&'a str) -> Cow<'a, str>) -> Cow<'a, str> {
+    let separators = [';', '\t', '\r', '\n'];
+    if text.contains(separators) {
+        text.split_inclusive(separators).map(of).collect::<String>().into()
+    } else {
+        of(text)
     }
 }
 
+/// Protects a text so that a spreadsheet shows it and does not compute it: `=1+1` becomes `'=1+1`. Numbers are
+/// unchanged.
+fn cell_text(text: &str) -> Cow<'_, str> {
+    by_pieces(text, |piece| match begins_formula(piece) && piece.parse::<f64>().is_err() {
+        true => Cow::Owned(format!("'{piece}")),
+        false => Cow::Borrowed(piece),
+    })
+}
+
 /// Inverse of `cell_text`.
-pub fn text_of_cell(field: &str) -> &str {
-    field.strip_prefix('\'').filter(|text| begins_formula(text)).unwrap_or(field)
+pub fn text_of_cell(field: &str) -> Cow<'_, str> {
+    by_pieces(field, |piece| {
+        Cow::Borrowed(piece.strip_prefix('\'').filter(|text| begins_formula(text)).unwrap_or(piece))
+    })
 }
 
 /// A text as a CSV field, quoted if needed.
@@ -234,6 +246,9 @@ mod tests {
         for text in ["", "a", "1", "-1.5", "+2e3", "-inf", "it's", "'a", "01_cut_in_24_22_1/2/1.2s/RSS"] {
             assert_eq!(cell_text(text), text);
             assert_eq!(text_of_cell(text), text);
+        }
+        for (text, field) in [("a;=1+1", "a;'=1+1"), ("a;'=b;c", "a;''=b;c"), ("a\n@b", "a\n'@b")] {
+            assert_eq!((&*cell_text(text), &*text_of_cell(field)), (field, text));
         }
         assert_eq!(csv_field("=a,b"), "\"'=a,b\"");
     }

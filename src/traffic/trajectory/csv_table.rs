@@ -15,6 +15,7 @@ use sha2::{Digest, Sha256};
 use super::number;
 use crate::support::input_file;
 use crate::support::plain_text::nearest;
+use crate::support::table::{delimiter_of, has_decimal_commas};
 use crate::{Error, Place, Result};
 
 /// Identity of a file's content in the run record.
@@ -397,29 +398,6 @@ impl CsvTable {
         };
         self.bad(column, format!("{} is not {expected}", self.shown(column)), help)
     }
-}
-
-/// The delimiter that the first line has most of; a comma if it has none.
-fn delimiter_of(start: &[u8]) -> u8 {
-    let line = start.split(|&byte| byte == b'\n').next().unwrap_or_default();
-    let count = |delimiter: &u8| line.iter().filter(|&byte| byte == delimiter).count();
-    [b'|', b'\t', b';', b','].into_iter().max_by_key(count).unwrap_or(b',')
-}
-
-/// Whether more fields of the first lines look like numbers with a decimal comma than with a point, as names of lanes may (`1.2`).
-fn has_decimal_commas(start: &[u8], delimiter: u8) -> bool {
-    let is_decimal = |field: &[u8], mark: u8| {
-        let field = field.trim_ascii();
-        let digits = field.strip_prefix(b"-").unwrap_or(field);
-        let is_number = digits.iter().all(|byte| byte.is_ascii_digit() || *byte == mark);
-        is_number && digits.iter().filter(|byte| **byte == mark).count() == 1 && digits.len() > 1
-    };
-    let fields = start.split(|byte| *byte == b'\n' || *byte == delimiter).map(|field| {
-        let field = field.trim_ascii();
-        field.strip_prefix(b"\"").and_then(|inner| inner.strip_suffix(b"\"")).unwrap_or(field)
-    });
-    let count = |mark| fields.clone().filter(|field| is_decimal(field, mark)).count();
-    count(b',') > count(b'.')
 }
 
 /// A header field as a column name.

@@ -22,21 +22,16 @@ use lanesweep::{Error, Place, Result};
 
 use super::seeds::Seeds;
 
-/// Puts the checksum right that a change has spoilt.
-pub type Reseal = fn(&[u8], &Path, &Seeds) -> Option<Vec<u8>>;
-
 /// One kind of input.
 pub struct Reader {
     pub name: &'static str,
     pub seeds: Vec<Vec<u8>>,
     /// Reads the bytes, alone in a folder, and uses what was read; `heavy` for the steps that take longer.
     pub read: fn(&[u8], &Path, &Seeds, heavy: bool) -> Result<()>,
-    /// Makes a file's checksum fit again.
-    pub reseal: Option<Reseal>,
 }
 
 pub fn all(seeds: &Seeds) -> Vec<Reader> {
-    let plain = |name, read| Reader { name, seeds: seeds.files[name].clone(), read, reseal: None };
+    let plain = |name, read| Reader { name, seeds: seeds.files[name].clone(), read };
     vec![
         plain("tracks", |b, d, s, _| recording(0, b, d, s)),
         plain("tracksMeta", |b, d, s, _| recording(1, b, d, s)),
@@ -52,7 +47,7 @@ pub fn all(seeds: &Seeds) -> Vec<Reader> {
         plain("exiD tracks", exid),
         plain("track table", |b, d, _, _| tracks_named("own.csv", b, d)),
         plain("preset", preset),
-        Reader { reseal: Some(reseal_density), ..plain("density", density) },
+        plain("density", density),
         plain("external S'", external),
         plain("part", part),
         plain("plan", plan),
@@ -191,15 +186,6 @@ fn proposal(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
     let stream = Stream { seed: 5, purpose: 1 };
     (0..20).for_each(|index| drop(proposal.draw(&stream, index, 0)));
     Ok(())
-}
-
-/// The message of a density file whose content was changed says which checksum would fit.
-fn reseal_density(bytes: &[u8], dir: &Path, _: &Seeds) -> Option<Vec<u8>> {
-    let message = read_density(&file(bytes, dir, "d.json")).err()?.to_string();
-    let (_, rest) = message.split_once("content_sha256`: is ")?;
-    let (old, rest) = rest.split_once(", but the content has ")?;
-    let new = rest.get(..64)?;
-    Some(String::from_utf8(bytes.to_vec()).ok()?.replacen(old, new, 1).into_bytes())
 }
 
 fn part(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
