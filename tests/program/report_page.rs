@@ -118,7 +118,7 @@ fn sampling_runs_maps_and_comparisons_have_their_page() {
     let sample = "sample d/cut-in-2.json --backend cpu --samples 3000";
     quietly(dir, &format!("{sample} --thw 1,0.6,0.2 --out mc"));
     let html = page(&dir.join("mc"));
-    for said in ["convergence.svg", "headways.csv", "<dt>SHA-256 of the density</dt>", "verdict"] {
+    for said in ["convergence.svg", "headways.csv", "<dt>SHA-256 of the density</dt>", "usable"] {
         assert!(html.contains(said), "{said}");
     }
     quietly(dir, &format!("{sample} --estimator is --thw 0.2 --models RSS --out is"));

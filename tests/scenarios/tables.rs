@@ -55,10 +55,13 @@ prop_compose! {
     ) -> Scenario {
         let category = Category::ALL[category];
         let has_lead = category == Category::CutOut;
+        // Who is beside the ego or behind it does not lead it.
+        let ahead = |of: Option<f64>| if category == Category::CutIn { of } else { of.map(f64::abs) };
         Scenario {
             id: String::new(), category, recording, ego_id, target_id: 7, lead_id, frame0, frame1: -1, fps, kept, reason,
             ego: Ego { v0, length, width }, lane_width, side: if side { Side::Left } else { Side::Right }, target,
-            lead: has_lead.then_some(lead), thw0, gap0, lead_gap: has_lead.then_some(lead_gap), peak_decel: thw0,
+            lead: has_lead.then_some(lead), thw0: ahead(thw0), gap0: ahead(gap0),
+            lead_gap: has_lead.then_some(lead_gap.abs()), peak_decel: thw0,
             truncated_start, end_cause, frame_switch, tag_frames: tags, synthetic: kept, replays: Vec::new(),
         }
     }

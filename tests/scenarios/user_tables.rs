@@ -365,7 +365,9 @@ fn cut_ins(count: usize, change: impl Fn(usize, usize) -> Option<String>) -> Str
     for id in 0..count {
         for k in 0..20 {
             let (time_s, y) = (k as f64 / 10.0, 3.5 - 0.1 * k as f64);
-            let row = format!("s{id},cut-in,{time_s},{},4.5,1.8,left,4.2,1.9,20,{y}\n", 28 + id % 3);
+            // No scenario is a copy of another.
+            let (ego, other) = (28 + id % 3, 20.0 + id as f64 / 64.0);
+            let row = format!("s{id},cut-in,{time_s},{ego},4.5,1.8,left,4.2,1.9,{other},{y}\n");
             text.push_str(&change(id, k).unwrap_or(row));
         }
     }
