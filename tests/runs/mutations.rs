@@ -83,7 +83,6 @@ fn changed_files_of_a_run_are_refused_or_have_no_effect() {
     std::fs::write(dir.join(journal), journal_of(&lines)).unwrap();
 
     let merge = |file, results| Input { file, reader: format!("-q merge {results}"), results };
-    let few = "-q sample densities/cut-in-2.json --samples 200 --thw 0.6 --backend cpu --out few".to_owned();
     let inputs = [
         merge("study/plan.json", "study"),
         merge("study/part-00000-of-00002.json", "study"),
@@ -91,7 +90,6 @@ fn changed_files_of_a_run_are_refused_or_have_no_effect() {
         merge("sample/part-00001-of-00002.json", "sample"),
         merge("is/plan.json", "is"),
         merge("is/part-00000-of-00002.json", "is"),
-        Input { file: "densities/cut-in-2.json", reader: few, results: "few" },
         Input { file: journal, reader: format!("{SAMPLE} --shard 0/2 --out journal"), results: "journal" },
     ];
     let whole: Vec<Vec<u8>> = inputs.iter().map(|input| std::fs::read(dir.join(input.file)).unwrap()).collect();

@@ -284,7 +284,7 @@ fn converted_recordings_of_one_name_stay_apart_and_made_up_and_replace_no_file()
     ran(dir, convert);
     let record = json(&out.join("converted.json"));
     let names = record["recordings"].as_array().unwrap().iter().map(|of| (of["recording"].clone(), of["of"].clone()));
-    let pairs = [("01", "01"), ("02", "02"), ("03", "01"), ("04", "02")];
+    let pairs = [("01", "01"), ("02", "02"), ("03", "01-2"), ("04", "02-2")];
     assert!(names.eq(pairs.map(|(name, of)| (name.into(), of.into()))), "{record}");
     // The scenarios of all four are found, and said to be made up.
     let mined = |folder: &str| {
