@@ -42,7 +42,8 @@ fn a_study_on_a_device_writes_the_same_files_as_on_the_cpu() {
             let page = |folder: &str| String::from_utf8(read(folder)).unwrap();
             let parts = ["cpu", "device"].map(|folder| common::page::without_host(&page(folder)));
             assert!(parts[0] == parts[1] && page("device").contains("exact path"));
-        } else {
+        } else if name != "lanesweep-files.json" {
+            // The list has the checksums of record and page.
             assert!(read("cpu") == read("device"), "{}", name.display());
             files += 1;
         }
