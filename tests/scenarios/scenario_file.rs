@@ -115,10 +115,7 @@ fn what_is_not_json_is_refused_with_its_line() {
     assert!(refused(nan).contains("not JSON"));
     assert!(refused(good.replacen("25.0", "1e999", 1)).contains("number out of range"));
     assert!(refused("[1, 2]").contains("not a scenario"));
-    // Neither UTF-8 nor, with its mark, UTF-16.
-    for bytes in [&b"{\xff}"[..], b"\xff\xfe{}\x00"] {
-        assert!(refused(bytes).contains("UTF-"), "{}", refused(bytes));
-    }
+    assert!(refused(b"{\xff}").contains("UTF-8"));
 }
 
 #[test]
