@@ -10,6 +10,7 @@ use crate::model::driver::ModelId;
 use crate::scenario::Category;
 use crate::scenario::Driven;
 use crate::scenario::parameterization::Parameterization;
+use crate::support::plausibility::Quantity;
 use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
@@ -186,6 +187,11 @@ impl ExposureFlags {
     pub(super) fn driven(&self) -> Result<Driven> {
         let driven = Driven { hours: self.hours, kilometres: self.km };
         driven.validate()?;
+        if let Some(mean_mps) = self.hours.zip(self.km).map(|(hours, km)| km / hours / 3.6)
+            && !(1.0..=70.0).contains(&mean_mps)
+        {
+            tracing::warn!("--hours and --km: a mean speed of {mean_mps:.3} m/s is not plausible (1 to 70 m/s)");
+        }
         Ok(driven)
     }
 }
@@ -224,6 +230,9 @@ pub(super) fn headways(list: &str, words: &str) -> Result<Vec<Headway>> {
             return Ok(Headway::MinFollowing);
         }
         let value = text.trim().parse::<f64>().ok().filter(|v| v.is_finite() && *v > 0.0 && *v < 1e4);
+        if let Some(value) = value.filter(|value| !Quantity::Headway.is_plausible(*value)) {
+            tracing::warn!("--thw: {} is used as it is", Quantity::Headway.describe(value));
+        }
         value.map(Headway::thw).ok_or_else(|| {
             let problem = format!("`{text}` is not a time headway");
             let help = format!("give seconds above 0 with commas, `r157`, {words}");

@@ -3,9 +3,14 @@
 
 use std::path::Path;
 
-use lanesweep::scenario::{Category, Ego, Other, Scenario, Side, read_scenarios, write_scenarios, write_scenarios_to};
+use lanesweep::scenario::{
+    Category, Ego, Other, Scenario, Side, read_scenario_file, read_scenarios, write_scenarios, write_scenarios_to,
+};
 use lanesweep::support::error::Error;
+use lanesweep::support::plausibility::Implausible;
 use serde_json::Value;
+
+use crate::common;
 
 fn cut_out() -> Scenario {
     let series = |from: f64| (0..4).map(|k| from + f64::from(k) / 3.0).collect::<Vec<_>>();
@@ -64,6 +69,35 @@ fn refused_change(change: impl FnOnce(&mut Value)) -> String {
     assert!(message.contains("line 1"), "{message}");
     assert!(message.contains("scenario 01_cut_out_5_4_77"), "{message}");
     message
+}
+
+#[test]
+fn what_a_scenario_says_twice_and_differently_is_named() {
+    let notes = |category, change: &dyn Fn(&mut Scenario)| {
+        let mut list: Vec<Scenario> = common::mined::scenarios_of(2).to_vec();
+        list.iter_mut().filter(|s| s.category == category).for_each(change);
+        let written = tempfile::NamedTempFile::new().unwrap();
+        write_scenarios(written.path(), &list).unwrap();
+        read_scenario_file(written.path(), Implausible::Refused).unwrap().notes.join("\n")
+    };
+    assert_eq!(notes(Category::CutIn, &|_| ()), "");
+    let slower = |s: &mut Scenario| s.target.v.iter_mut().for_each(|v| *v /= 3.6 * 3.6);
+    let thinner = |s: &mut Scenario| {
+        s.target.v = s.target.v.iter().copied().step_by(2).collect();
+        s.target.y = s.target.y.iter().copied().step_by(2).collect();
+    };
+    let cases: [(Category, &dyn Fn(&mut Scenario), &str); 6] = [
+        (Category::Lvd, &slower, "have a `peak_decel` that the changes of `target.v` contradict"),
+        (Category::Lvd, &|s| s.fps = 10.0, "have a `peak_decel` that the changes of `target.v` contradict"),
+        (Category::Lvd, &thinner, "have not one sample per frame from `frame0` to `frame1`"),
+        (Category::CutIn, &|s| s.ego.v0 /= 3.6, "have a `gap0` that is not `thw0` times `ego.v0`"),
+        (Category::CutIn, &|s| s.gap0 = s.gap0.map(|gap| gap / 2.0), "have a `gap0` that is not `thw0` times `ego.v0`"),
+        (Category::CutIn, &|s| s.target.y.iter_mut().for_each(|y| *y += 1.75), "are never in the ego's lane"),
+    ];
+    for (category, change, expected) in cases {
+        let said = notes(category, change);
+        assert!(said.contains(expected), "{expected}: {said}");
+    }
 }
 
 #[test]

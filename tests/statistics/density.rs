@@ -473,7 +473,7 @@ fn files_of_earlier_versions_keep_their_checksum_and_other_kinds_are_refused() {
     "test": 10,
     "seed": 157
   }"#;
-    // The checksum is calculated anew: an edited file gets its own, and that stays.
+    // The checksum is calculated anew: an edited file says so, gets its own, and that stays.
     let edited = written.replace("\"representativeness\": null", figures);
     let again = |text: &str| {
         let read = DensityModel::from_json(text.as_bytes(), &place).unwrap();
@@ -481,6 +481,16 @@ fn files_of_earlier_versions_keep_their_checksum_and_other_kinds_are_refused() {
     };
     let earlier = again(&edited);
     assert!(earlier.contains(figures) && earlier != edited && again(&earlier) == earlier);
+    assert!(earlier.contains("; changed since `fit`") && !again(&written).contains("; changed since `fit`"));
+    // Rates follow from what was counted.
+    let driven = DataProvenance { driven: Some(Driven { hours: Some(2.0), kilometres: None }), ..mined::provenance() };
+    let options = FitOptions { valid_draws: 1000, ..FitOptions::default() };
+    let id = Parameterization::find(Category::CutIn, "1").unwrap();
+    let fitted = DensityModel::fit(id, scenarios_of(4), &driven, &options).unwrap().model;
+    let halved = String::from_utf8(fitted.to_json().unwrap()).unwrap().replace("\"hours\": 2.0", "\"hours\": 4.0");
+    let rate = |of: &DensityModel| of.exposure.unwrap().per_hour.unwrap().estimate;
+    let read = DensityModel::from_json(halved.as_bytes(), &place).unwrap();
+    assert_eq!(2.0 * rate(&read), rate(&fitted));
     let other =
         written.replace("\"kernels\"", "\"mixture\": {\"kind\": \"copula\", \"weights\": [1.0]},\n  \"kernels\"");
     let error = DensityModel::from_json(other.as_bytes(), &place).unwrap_err();

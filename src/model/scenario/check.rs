@@ -187,7 +187,7 @@ pub(super) fn admit(
 }
 
 /// Changes over `n` samples, per second.
-fn rates(series: &[f64], n: usize, fps: f64) -> impl Iterator<Item = f64> {
+pub(super) fn rates(series: &[f64], n: usize, fps: f64) -> impl Iterator<Item = f64> {
     series.iter().zip(series.iter().skip(n)).map(move |(before, after)| (after - before) * fps / n as f64)
 }
 

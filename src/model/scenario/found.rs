@@ -130,7 +130,7 @@ impl ScenariosRead {
             self.problems.push(Error::input(file, problem, "correct the others first"));
         }
         let mut notes = self.doubts.sentences();
-        notes.extend(lateral_notes(&self.scenarios));
+        notes.extend(contradictions(&self.scenarios));
         Ok(ScenarioFile { scenarios: self.scenarios, problems: self.problems, notes })
     }
 }
@@ -144,40 +144,87 @@ pub fn usable(scenarios: Vec<Scenario>, implausible: Implausible) -> ScenarioFil
     }
     read.scenarios.retain(|scenario| !read.doubled.contains(&scenario.id));
     let mut notes = read.doubts.sentences();
-    notes.extend(lateral_notes(&read.scenarios));
+    notes.extend(contradictions(&read.scenarios));
     ScenarioFile { scenarios: read.scenarios, problems: read.problems, notes }
 }
 
 /// Maximum lateral motion that is not counted as a contradiction, m.
 const LATERAL_NOISE_M: f64 = 0.5;
+/// Maximum distance from the middle of the lane where a lane change is in it, in widths of the lane.
+const IN_LANE_SHARE: f64 = 0.4;
 
-/// Finds kept lane changes whose lateral position contradicts their category or side; one sentence per kind.
-fn lateral_notes(scenarios: &[Scenario]) -> Vec<String> {
-    let ends = |scenario: &Scenario| {
-        let y = &scenario.target.y;
-        let (first, last) = (*y.first()?, *y.last()?);
-        // A cut-in begins beside the ego's lane; a cut-out ends there.
-        match scenario.category {
-            Category::CutIn => Some((first, last)),
-            Category::CutOut => Some((last, first)),
-            Category::Lvd => None,
-        }
-    };
-    let note = |what: &str, help: &str, applies: &dyn Fn(f64, f64) -> bool| {
-        let is_such = |s: &&Scenario| s.kept && ends(s).is_some_and(|(outside, inside)| applies(outside, inside));
-        let mut such = scenarios.iter().filter(is_such);
+/// Finds scenarios that say one thing twice and differently; one sentence per kind.
+fn contradictions(scenarios: &[Scenario]) -> Vec<String> {
+    let note = |kept: bool, words: &str, help: &str, applies: &dyn Fn(&Scenario) -> bool| {
+        let mut such = scenarios.iter().filter(|s| (s.kept || !kept) && applies(s));
         let first = such.next()?;
-        Some(format!("{} lane change(s) {what}, the first is scenario {}: {help}", such.count() + 1, first.id))
+        Some((such.count() + 1, format!("{words}, the first is scenario {}: {help}", first.id)))
     };
-    let wrong_way = note(
-        "move away from the ego's lane where they should enter it, or the reverse",
+    let of = |found: Option<(usize, String)>| found.map(|(count, text)| format!("{count} {text}"));
+    let changes = scenarios.iter().filter(|s| s.kept && outside_and_inside(s).is_some()).count();
+    let off = note(
+        true,
+        "kept lane changes are never in the ego's lane",
         "y is the distance from the middle of the ego's lane",
-        &|outside, inside| inside.abs() > outside.abs() + LATERAL_NOISE_M,
+        &|s| outside_and_inside(s).is_some_and(|(_, inside)| inside.abs() > IN_LANE_SHARE * s.lane_width),
     );
-    let wrong_side = note(
-        "have a lateral position against their `side`",
-        "y is positive on the side that the vehicle comes from or leaves to",
-        &|outside, _| outside < -LATERAL_NOISE_M,
-    );
-    wrong_way.into_iter().chain(wrong_side).collect()
+    [
+        of(note(
+            true,
+            "lane change(s) move away from the ego's lane where they should enter it, or the reverse",
+            "y is the distance from the middle of the ego's lane",
+            &|s| outside_and_inside(s).is_some_and(|(out, inside)| inside.abs() > out.abs() + LATERAL_NOISE_M),
+        )),
+        of(note(
+            true,
+            "lane change(s) have a lateral position against their `side`",
+            "y is positive on the side that the vehicle comes from or leaves to",
+            &|s| outside_and_inside(s).is_some_and(|(out, _)| out < -LATERAL_NOISE_M),
+        )),
+        // A lane change may end beyond its lane; most do not.
+        of(off.filter(|(count, _)| 2 * count > changes)),
+        of(note(
+            false,
+            "scenario(s) have a `gap0` that is not `thw0` times `ego.v0`",
+            "one of the three has another unit or belongs to another scenario",
+            &|s| {
+                let both = s.gap0.zip(s.thw0).filter(|_| s.ego.v0 > 0.0);
+                both.is_some_and(|(gap, thw)| (gap - thw * s.ego.v0).abs() > (0.05 * gap.abs()).max(0.5))
+            },
+        )),
+        of(note(
+            false,
+            "scenario(s) have not one sample per frame from `frame0` to `frame1`",
+            "samples were left out or added; then `fps` and both frames change too",
+            &|s| s.frame1 > s.frame0 && s.frame1.abs_diff(s.frame0).abs_diff(s.target.v.len() as u64 - 1) > 1,
+        )),
+        of(note(
+            false,
+            "scenario(s) have a `peak_decel` that the changes of `target.v` contradict",
+            "the series has another unit, or `fps` is not its rate",
+            &contradicts_its_peak,
+        )),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
+}
+
+/// Lateral position of a lane change where it is out of the ego's lane, and where it is in it, m.
+fn outside_and_inside(scenario: &Scenario) -> Option<(f64, f64)> {
+    let y = &scenario.target.y;
+    let (first, last) = (*y.first()?, *y.last()?);
+    match scenario.category {
+        Category::CutIn => Some((first, last)),
+        Category::CutOut => Some((last, first)),
+        Category::Lvd => None,
+    }
+}
+
+/// Whether the recorded peak exceeds every change of a sample, or changes of half a second exceed it, by half and 1 m/s².
+fn contradicts_its_peak(scenario: &Scenario) -> bool {
+    let Some(peak) = scenario.peak_decel else { return false };
+    let half_second = (scenario.fps / 2.0).round().max(1.0) as usize;
+    let largest = |n| super::check::rates(&scenario.target.v, n, scenario.fps).fold(0.0, |a: f64, b| a.max(-b));
+    peak > 1.5 * largest(1) + 1.0 || largest(half_second) > 1.5 * peak.max(0.0) + 1.0
 }

@@ -210,7 +210,7 @@ impl File {
             kde,
             valid: share,
             sizes: self.sizes,
-            exposure: self.exposure,
+            exposure: self.exposure.map(|of| Exposure::new(of.events, of.driven)),
             earlier: self.representativeness,
             provenance: self.provenance,
             scenarios: self.scenarios,
@@ -251,10 +251,13 @@ impl DensityModel {
     /// Reads a density file's content; `place` names it in errors.
     ///
     /// # Errors
-    /// [`Error::Input`] unless it is a complete, unchanged density file of this version: see [`read_density`].
+    /// [`Error::Input`] unless it is a complete density file of this version: see [`read_density`].
     pub fn from_json(text: &[u8], place: &Place) -> Result<DensityModel> {
         check_version(text, place)?;
-        let file: File = serde_json::from_slice(text).map_err(|e| broken(place, &e))?;
+        let mut file: File = serde_json::from_slice(text).map_err(|e| broken(place, &e))?;
+        if file.content_sha256 != file.hash()? {
+            file.provenance.data.push_str("; changed since `fit`");
+        }
         file.model(place)
     }
 }
