@@ -241,7 +241,7 @@ impl SampleReport {
         };
         let sampled = |row: &EstimateRow| row.recorded.and_then(|recorded| recorded.sampled);
         let ratio = |row| sampled(row).and_then(|r| Some(format!("{} {}", short(r.ratio?), r.verdict.mark())));
-        let mut table = self
+        let table = self
             .named(estimates.iter().filter(|row| is_in(row)))
             .column("failures", |row| row.estimate.failures)
             .column(three_digits("P"), |row| row.estimate.probability)
@@ -249,16 +249,25 @@ impl SampleReport {
                 NumberText(interval_text(e.interval.low, e.interval.high, e.interval.kind))
             })
             .column("±", half_width);
-        if estimates.iter().any(|row| row.risk.per_hour.is_some()) {
-            table = table.column("per hour", |row| rate_text(row.risk.per_hour));
-        }
-        if estimates.iter().any(|row| row.risk.per_1000_km.is_some()) {
-            table = table.column("per 1000 km", |row| rate_text(row.risk.per_1000_km));
-        }
+        let mut table = self.with_rates(table);
         if estimates.iter().any(|row| sampled(row).is_some()) {
             table = table.column(Column::from("P/S").null("–"), ratio);
         }
         table.column(USABLE, |row| row.estimate.trust.usable()).build()
+    }
+
+    /// With the columns that only some runs have: P of possible traffic, and rates where the headway is observed.
+    pub(super) fn with_rates<'a>(&self, mut table: TableOf<&'a EstimateRow>) -> TableOf<&'a EstimateRow> {
+        if self.estimates.iter().any(|row| row.no_traffic.is_some()) {
+            let possible = |row: &EstimateRow| row.no_traffic.map(|of| of.possible_probability);
+            table = table.column(three_digits("P possible").null("–"), possible);
+        }
+        let rates: [(&str, fn(&EstimateRow) -> Option<RiskRate>); 2] =
+            [("per hour", |row| row.risk.per_hour), ("per 1000 km", |row| row.risk.per_1000_km)];
+        for (name, rate) in rates.into_iter().filter(|(_, rate)| self.estimates.iter().any(|row| rate(row).is_some())) {
+            table = table.column(name, move |row| rate_text(rate(row)));
+        }
+        table
     }
 
     /// A row per estimate, with what it is of.

@@ -2,7 +2,7 @@
 
 use super::html::{Page, PageFigure, Section};
 use super::plot::{AxisScale, Figure, Mark, Plot, PlotAxis, Series, Value, is_few};
-use super::sampling::{SampleReport, USABLE, interval_text, rate_text, ratio_text, short, three_digits, weight};
+use super::sampling::{SampleReport, USABLE, interval_text, ratio_text, short, three_digits, weight};
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
@@ -63,7 +63,7 @@ impl SampleReport {
                 .is_finite()
                 .then(|| NumberText(if percent < 1000.0 { format!("{percent:.1}") } else { "> 999".to_owned() }))
         };
-        let estimates = self
+        let table = self
             .named(overall.iter().copied())
             .column("runs", |row| row.estimate.runs)
             .column("failures", |row| row.estimate.failures)
@@ -71,9 +71,9 @@ impl SampleReport {
             .column("interval", |EstimateRow { estimate: e, .. }| {
                 interval_text(e.interval.low, e.interval.high, e.interval.kind)
             })
-            .column(Column::from("± in %").null("–"), wide)
-            .column("per hour", |row| rate_text(row.risk.per_hour))
-            .column("per 1000 km", |row| rate_text(row.risk.per_1000_km))
+            .column(Column::from("± in %").null("–"), wide);
+        let estimates = self
+            .with_rates(table)
             .column("P/S", |row| ratio_text(row.recorded.and_then(|recorded| recorded.sampled)))
             .column(USABLE, |row| row.estimate.trust.usable())
             .build();

@@ -59,7 +59,7 @@ fn replay(
 }
 
 impl Sample {
-    /// Adds the rates of the recorded scenarios to the result. Adds a warning if the rates differ, if there are too few
+    /// Adds the rates of the recorded scenarios to the result, and what draws without possible traffic are of it. Adds a warning if the rates differ, if there are too few
     /// failures, or if the density does not contain its scenarios.
     ///
     /// # Errors
@@ -71,6 +71,7 @@ impl Sample {
             SampleHeadways::Each(headways) => headways.clone(),
             SampleHeadways::Sampled => vec![Headway::Observed],
         };
+        self.count_no_traffic(&mut result.rows, &headways)?;
         let is_comparable = !density.scenarios.is_empty();
         let replayed = is_comparable.then(|| replay(density, &self.profile, &options.models, &headways));
         let Some([recorded, replayed]) = replayed.transpose()?.flatten() else {
@@ -95,7 +96,7 @@ impl Sample {
 }
 
 /// The cells of a row: one headway, or all.
-fn cells_of(row: &EstimateRow, models: &[ModelId], headways: &[Headway]) -> Vec<usize> {
+pub(super) fn cells_of(row: &EstimateRow, models: &[ModelId], headways: &[Headway]) -> Vec<usize> {
     let model = models.iter().position(|model| *model == row.model).unwrap_or_default();
     // A density with its own headway has a single headway, independent of its name.
     let is_of = |at: &usize| headways.len() == 1 || row.headway == "all" || headways[*at].to_string() == row.headway;
