@@ -253,7 +253,11 @@ fn demand_of(judgement: &Judgement) -> Option<String> {
     let listed = |holds| quantities(holds).collect::<Vec<_>>().join("; ");
     Some(match (judgement.demand()?, &judgement.demand_flips[..]) {
         (Demand::Avoid, []) => {
-            let robust = if judgement.reading_turns_demand { "another reading turns this" } else { "robust" };
+            let robust = if judgement.reading_turns_demand {
+                "lane intrusion by a front tyre 0.1 m within the box turns this"
+            } else {
+                "robust"
+            };
             format!("{clause}: the system has to avoid the collision ({robust})")
         }
         (Demand::Nothing, []) => format!("{clause}: no demand: {}", listed(Holds::No)),

@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::sampling::{SampleReport, short};
 use crate::run::sampling::{Checkpoint, EstimateRow, RiskRate, TRAFFIC_DRAWS, Uncertainty};
 use crate::stats::estimate::{Ratio, Warning, WeightFigures};
-use crate::support::readable::{count, counted, significant};
+use crate::support::readable::{count, count_of, counted, significant};
 use crate::support::table::{NamedValue, Table};
 
 impl SampleReport {
@@ -159,9 +159,16 @@ impl SampleReport {
 
     /// How to read the estimates, one sentence after the other.
     pub(super) fn rules(&self) -> impl Iterator<Item = String> {
-        [self.mean_rule(), self.traffic_rule(), self.exposure_rule(), self.sources_rule(), self.recorded_rule()]
-            .into_iter()
-            .flatten()
+        [
+            self.mean_rule(),
+            self.traffic_rule(),
+            self.exposure_rule(),
+            self.sources_rule(),
+            self.recorded_rule(),
+            self.tail_rule(),
+        ]
+        .into_iter()
+        .flatten()
     }
 
     /// What P over all headways averages; `None` for a single headway.
@@ -186,6 +193,19 @@ impl SampleReport {
             significant(100.0 * fraction, 2),
             count(TRAFFIC_DRAWS)
         ))
+    }
+
+    /// A density of N scenarios is based on no data below a probability of 1/N; `None` where no row is below.
+    fn tail_rule(&self) -> Option<String> {
+        let kernels = self.density.kernels;
+        let is_below = self
+            .estimates
+            .iter()
+            .any(|row| row.is_overall(&self.estimates) && row.estimate.probability * (kernels as f64) < 1.0);
+        is_below.then(|| {
+            let (resolved, kernels) = (short(1.0 / kernels as f64), count_of(kernels));
+            format!("Probabilities below {resolved} (one in {kernels} scenarios) come from the tails of the density's kernels, not from data")
+        })
     }
 
     /// Why there is no rate per hour; `None` if the density draws the headway.

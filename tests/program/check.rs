@@ -144,7 +144,7 @@ fn each_clause_has_its_demand_beside_the_drivers() {
         + UN R157, 5.2.5.2: no demand: (b)
         cut-in 60 45 7.2 1 --profiles un-r157,eu-2022-1426,eu-2022-1426-standing = 0
         + UN R157, 5.2.5.2: no demand: (c) TTC at lane intrusion is 0.628 s; the clause applies where it is > 0.6972 s
-        + EU 2022/1426, 1.4.2: the system has to avoid the collision (robust)
+        + EU 2022/1426, 1.4.2: the system has to avoid the collision (lane intrusion by a front tyre 0.1 m within
         + EU 2022/1426, 1.4.2, standing: no demand: (c)
         # These profiles drop condition (b), so the regulation's clause is not judged.
         cut-in 60 40 15 1 --profiles paper = 0
@@ -216,7 +216,7 @@ fn what_another_reading_turns_is_named_and_not_called_robust() {
         + CCHDM tests TTC once
         - Rests on a reading
         cut-in 100 70 18.2 1 = 0
-        + 5.2.5.2: the system has to avoid the collision (another reading turns this)
+        + 5.2.5.2: the system has to avoid the collision (lane intrusion by a front tyre 0.1 m within the box turns this)
         + not a front tyre 0.1 m within it
         ",
     );

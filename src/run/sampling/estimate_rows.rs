@@ -3,7 +3,7 @@
 
 use serde::Serialize;
 
-use super::no_traffic::NoTraffic;
+use super::against_recorded::NoTraffic;
 use super::sample_options::SampleOptions;
 use super::uncertainty::Uncertainty;
 use crate::engine::{LanePlan, SampleTally, cell_of};
