@@ -24,12 +24,12 @@ def check(holds, what):
 for table, sums in [("lanes", ["max_btn", "reaction_s", "impact_speed_mps", "end_s", "contact_type"]),
                     ("samples", ["sample", "min_ttc_s", "max_btn", "end_s", "v_target_mps"])]:
     path = str(folder / f"{table}.parquet")
-    csv = pd.read_csv(folder / f"{table}.csv", dtype={"variant": str, "parameterization": str}, keep_default_na=True)
+    csv = pd.read_csv(folder / f"{table}.csv", dtype={"variant": str}, keep_default_na=True)
     frames = {
         "pandas": pd.read_parquet(path),
         "Polars": pl.read_parquet(path).to_pandas(),
         "DuckDB": duckdb.sql(f"select * from '{path}'").df(),
-        "JSON Lines": pd.read_json(folder / f"{table}.jsonl", lines=True, dtype={"variant": str, "parameterization": str}),
+        "JSON Lines": pd.read_json(folder / f"{table}.jsonl", lines=True, dtype={"variant": str}),
     }
     for program, frame in frames.items():
         check(list(frame.columns) == list(csv.columns), f"{table}, {program}: columns {list(frame.columns)}")

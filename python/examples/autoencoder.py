@@ -87,7 +87,7 @@ def main() -> None:
     given = parser.parse_args()
     lanesweep.study(scenarios=given.scenarios, categories=given.category, cross_validate=True, out=given.out / "folds")
     with (given.out / "folds" / "folds.csv").open(encoding="utf-8") as lines:
-        folds = {row["scenario"]: int(row["fold"]) for row in csv.DictReader(lines)}
+        folds = {row["id"]: int(row["fold"]) for row in csv.DictReader(lines)}
     with given.scenarios.open(encoding="utf-8") as lines:
         scenarios = [scenario for scenario in map(json.loads, lines) if scenario["id"] in folds]
     z = np.array([vector(scenario) for scenario in scenarios])

@@ -28,7 +28,7 @@ STATUS = {
 _ANSWERS = {"check": "preventable"}
 
 #: Columns whose values are names, even where all of them look like numbers.
-_NAMES = {"id", "scenario", "parameterization", "variant", "headway", "category", "model", "criterion", "lane", "claim"}
+_NAMES = {"id", "scenario", "variant", "headway", "category", "model", "criterion", "lane", "claim"}
 
 
 class Figure:

@@ -185,7 +185,7 @@ def test_a_justification_has_the_scores_and_intervals_of_the_study(study: tuple[
         found = recipes.justification(lanes, key.removesuffix("-cv"), model="Reg157", criterion=criterion)
         (of,) = f1.filter(variant=key, criterion=criterion).to_dicts()
         scores = {row["quantity"]: row for row in found.scores.to_dicts()}
-        assert scores["recall"]["parameterization"] == key
+        assert scores["recall"]["variant"] == key
         for name, column in {"recall": "recall", "precision": "precision", "F1": "f1"}.items():
             assert scores[name]["value"] == pytest.approx(of[column])
         if of["f1_low"] is not None:

@@ -70,7 +70,11 @@ impl Mine {
                     scenarios_sha256: input_file::sha256(path)?,
                     driven: collection.driven(),
                 }
-                .write_beside(path, serde_json::json!(configured.record(false)))?;
+                .write_beside(
+                    path,
+                    serde_json::json!(configured.record(false)),
+                    collection.record(&configured.settings.mining),
+                )?;
                 tracing::info!("{} written to {}", counted(collection.scenarios.len(), "scenario"), path.display());
             }
             None => {

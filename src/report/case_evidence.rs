@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 
 use super::case_identity::{CaseIdentity, profile_sha256, program};
-use super::case_sheet::CaseSheet;
+use super::case_sheet::{CaseSheet, signed};
 use super::html::Section;
 use super::lanes::outcome_json;
 use super::records;
@@ -117,7 +117,11 @@ impl CaseSheet<'_> {
             let ((judged, outcome), dt_s) = of;
             let (coarse, fine) = (value(&judged.trace.outcome, judged.trace.dt_s), value(outcome, dt_s));
             match (coarse, fine) {
-                (Some(coarse), Some(fine)) if coarse.is_finite() && fine.is_finite() => Some(change(fine - coarse)),
+                (Some(coarse), Some(fine)) if coarse.is_finite() && fine.is_finite() => {
+                    // Below the digits that the sheet prints, and without a sign of rounding.
+                    let by = fine - coarse;
+                    Some(NumberText(if by.abs() < 1e-6 { "0".to_owned() } else { signed(by) }))
+                }
                 (Some(_), None) => Some(NumberText("ceases".to_owned())),
                 (None, Some(_)) => Some(NumberText("begins".to_owned())),
                 _ => None,
@@ -195,13 +199,4 @@ fn plain(of: &Value) -> String {
         Value::Array(list) => list.iter().map(plain).collect::<Vec<_>>().join(", "),
         other => other.to_string(),
     }
-}
-
-fn change(by: f64) -> NumberText {
-    // Below the digits that the sheet prints, and without a sign of rounding.
-    NumberText(if by.abs() < 1e-6 {
-        "0".to_owned()
-    } else {
-        format!("{}{}", if by < 0.0 { "-" } else { "+" }, value(by.abs()))
-    })
 }

@@ -150,11 +150,7 @@ impl CaseSheet<'_> {
 
     /// Readings for which the regulation is silent and another choice changes the answer.
     pub(super) fn silent(&self) -> Vec<String> {
-        self.first()
-            .silent
-            .iter()
-            .map(|sentence| format!("Rests on a reading where Annex 3 is silent: {sentence}"))
-            .collect()
+        self.first().silent.iter().map(|sentence| format!("Rests on a reading: {sentence}")).collect()
     }
 
     /// What the cut-in clauses demand of the system, each clause once, and where the first profile's clause and the
@@ -256,7 +252,14 @@ fn demand_of(judgement: &Judgement) -> Option<String> {
     };
     let listed = |holds| quantities(holds).collect::<Vec<_>>().join("; ");
     Some(match (judgement.demand()?, &judgement.demand_flips[..]) {
-        (Demand::Avoid, []) => format!("{clause}: the system has to avoid the collision (robust)"),
+        (Demand::Avoid, []) => {
+            let robust = if judgement.reading_turns_demand {
+                "lane intrusion by a front tyre 0.1 m within the box turns this"
+            } else {
+                "robust"
+            };
+            format!("{clause}: the system has to avoid the collision ({robust})")
+        }
         (Demand::Nothing, []) => format!("{clause}: no demand: {}", listed(Holds::No)),
         (Demand::Unknown, []) => format!(
             "{clause}: unknown whether the system has to avoid the collision, because the case begins after the movement \

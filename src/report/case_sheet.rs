@@ -405,6 +405,6 @@ fn ends(change: &Change) -> Value {
 }
 
 /// A number with its sign.
-fn signed(number: f64) -> String {
+pub(super) fn signed(number: f64) -> String {
     format!("{}{}", if number < 0.0 { "-" } else { "+" }, value(number.abs()))
 }

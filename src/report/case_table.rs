@@ -269,13 +269,14 @@ impl CaseAnswers {
 
     /// All columns of all rows.
     fn all(&self) -> Table {
-        let mut table = self
-            .columns(self.cases.iter().collect())
-            .column("case", |case| case.case.as_str())
-            .column("answer", |case| case.answer.as_str())
-            .column("demand", |case| case.demand.join(". "))
-            .column("rests_on", |case| case.rests_on)
-            .build();
+        let mut table = self.columns(self.cases.iter().collect());
+        if !self.is_nominal {
+            table = table
+                .column("case", |case| case.case.as_str())
+                .column("answer", |case| case.answer.as_str())
+                .column("demand", |case| case.demand.join(". "));
+        }
+        let mut table = table.column("rests_on", |case| case.rests_on).build();
         table.columns.extend(self.cases[0].numbers.iter().map(|(column, _)| column.clone()));
         for (row, case) in table.rows.iter_mut().zip(&self.cases) {
             row.extend(case.numbers.iter().map(|(_, cell)| cell.clone()));

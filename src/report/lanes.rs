@@ -169,7 +169,7 @@ fn sampled_columns(density: &DensityModel) -> Vec<Column> {
     let mut columns = vec![
         c("sample", ColumnKind::Whole, "1", "Index of the sample: with the seed it decides the point."),
         c("category", ColumnKind::Name, "", "Kind of scenario: cut_in, cut_out or lvd (leader decelerates)."),
-        c("parameterization", ColumnKind::Name, "", "Key of the parameterization whose parameters were drawn."),
+        c("variant", ColumnKind::Name, "", "Key of the parameterization whose parameters were drawn."),
         c("headway", ColumnKind::Name, "", "Initial time headway or gap with its unit; `sampled` where it is a parameter."),
         c("model", ColumnKind::Name, "", "Driver model."),
     ];

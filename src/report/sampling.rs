@@ -14,7 +14,7 @@ use crate::model::profile::Profile;
 use crate::run::sampling::{EstimateRow, RiskRate, SampleOptions};
 use crate::scenario::Category;
 use crate::stats::density::{DensityModel, Provenance};
-use crate::stats::estimate::{IntervalKind, Ratio, SearchRound, StopReason, WeightFigures};
+use crate::stats::estimate::{IntervalKind, SearchRound, StopReason, WeightFigures};
 use crate::support::readable::{count, count_of, significant, value};
 use crate::support::run_folder::ResultFiles;
 use crate::support::table::{Column, Digits, NumberText, Table, TableOf};
@@ -199,11 +199,7 @@ impl SampleReport {
             let _ = writeln!(text, "{of}: {remark}");
         }
         if self.estimates.iter().any(|r| r.estimate.weights.is_some()) {
-            let weights = self
-                .weights(&self.estimates)
-                .column("largest weight", weight(|w| NumberText(format!("{:.2} %", 100.0 * w.largest_fraction))))
-                .column("from the density", weight(|w| NumberText(format!("{:.1} %", 100.0 * w.crude_fraction))));
-            text.push_str(&weights.build().text());
+            text.push_str(&self.weights().text());
         }
         let intervals = format!(
             "Intervals at {} %{}. ± is the half-width of P's interval divided by P. ≤ is an upper bound where nothing failed.",
@@ -213,25 +209,14 @@ impl SampleReport {
         for rule in self.rules().chain([intervals]) {
             text += &paragraph(&rule);
         }
-        // A density of N scenarios is based on no data below a probability of 1/N.
-        let resolved = 1.0 / self.density.kernels as f64;
-        if self.estimates.iter().any(|r| r.is_overall(&self.estimates) && r.estimate.probability < resolved) {
-            let _ = writeln!(
-                text,
-                "Probabilities below {} (one in {} scenarios) come from the tails of the density's kernels, not from data",
-                short(resolved),
-                count_of(self.density.kernels)
-            );
-        }
         if self.density.provenance.synthetic {
             text.push_str("SYNTHETIC DATA: no number above is a statement about real traffic\n");
         }
         text
     }
 
-    /// The table of some estimates.
-    fn table(&self, is_in: impl Fn(&EstimateRow) -> bool) -> Table {
-        let estimates = &self.estimates;
+    /// The table of some estimates. P of possible traffic, rates and P/S are there where a row has them.
+    pub(super) fn table(&self, is_in: impl Fn(&EstimateRow) -> bool) -> Table {
         let half_width = |row: &EstimateRow| {
             NumberText(match 100.0 * row.estimate.relative_half_width {
                 width if !width.is_finite() => "–".to_owned(),
@@ -239,30 +224,36 @@ impl SampleReport {
                 percent => format!("{percent:.1} %"),
             })
         };
+        let has = |of: &dyn Fn(&EstimateRow) -> bool| self.estimates.iter().any(of);
         let sampled = |row: &EstimateRow| row.recorded.and_then(|recorded| recorded.sampled);
         let ratio = |row| sampled(row).and_then(|r| Some(format!("{} {}", short(r.ratio?), r.verdict.mark())));
-        let mut table = self
-            .named(estimates.iter().filter(|row| is_in(row)))
+        let possible = |row: &EstimateRow| row.no_traffic.map(|of| of.possible_probability);
+        let ends = |EstimateRow { estimate: e, .. }: &EstimateRow| {
+            NumberText(interval_text(e.interval.low, e.interval.high, e.interval.kind))
+        };
+        self.named(self.estimates.iter().filter(|row| is_in(row)))
             .column("failures", |row| row.estimate.failures)
             .column(three_digits("P"), |row| row.estimate.probability)
-            .column("interval", |EstimateRow { estimate: e, .. }| {
-                NumberText(interval_text(e.interval.low, e.interval.high, e.interval.kind))
+            .column("interval", ends)
+            .column("±", half_width)
+            .columns(has(&|row| possible(row).is_some()).then_some("P possible"), three_digits, |row, _| possible(row))
+            .columns(has(&|row| row.risk.per_hour.is_some()).then_some("per hour"), Column::from, |row, _| {
+                rate_text(row.risk.per_hour)
             })
-            .column("±", half_width);
-        if estimates.iter().any(|row| row.risk.per_hour.is_some()) {
-            table = table.column("per hour", |row| rate_text(row.risk.per_hour));
-        }
-        if estimates.iter().any(|row| row.risk.per_1000_km.is_some()) {
-            table = table.column("per 1000 km", |row| rate_text(row.risk.per_1000_km));
-        }
-        if estimates.iter().any(|row| sampled(row).is_some()) {
-            table = table.column(Column::from("P/S").null("–"), ratio);
-        }
-        table.column(USABLE, |row| row.estimate.trust.usable()).build()
+            .columns(has(&|row| row.risk.per_1000_km.is_some()).then_some("per 1000 km"), Column::from, |row, _| {
+                rate_text(row.risk.per_1000_km)
+            })
+            .columns(
+                has(&|row| sampled(row).is_some()).then_some("P/S"),
+                |name| Column::from(name).null("–"),
+                |row, _| ratio(row),
+            )
+            .column(USABLE, |row| row.estimate.trust.usable())
+            .build()
     }
 
     /// A row per estimate, with what it is of.
-    pub(super) fn named<'a>(&self, rows: impl IntoIterator<Item = &'a EstimateRow>) -> TableOf<&'a EstimateRow> {
+    fn named<'a>(&self, rows: impl IntoIterator<Item = &'a EstimateRow>) -> TableOf<&'a EstimateRow> {
         Table::of(rows)
             .column("model", |row| row.model.name())
             .column("criterion", |row| row.criterion.label())
@@ -270,10 +261,14 @@ impl SampleReport {
     }
 
     /// What the importance weights indicate, for those estimates that have them.
-    pub(super) fn weights<'a>(&self, rows: impl IntoIterator<Item = &'a EstimateRow>) -> TableOf<&'a EstimateRow> {
-        self.named(rows.into_iter().filter(|row| row.estimate.weights.is_some()))
+    pub(super) fn weights(&self) -> Table {
+        let percent = |name| Column::from(name).digits(Digits::Fixed(2));
+        self.named(self.estimates.iter().filter(|row| row.estimate.weights.is_some()))
             .column(three_digits("variance reduction"), |row| row.estimate.variance_reduction)
             .column("effective failures", weight(|w| w.effective_failures))
+            .column(percent("largest weight, %"), weight(|w| 100.0 * w.largest_fraction))
+            .column(percent("from the density, %"), weight(|w| 100.0 * w.crude_fraction))
+            .build()
     }
 
     /// Confidence level of the intervals.
@@ -288,38 +283,31 @@ impl SampleReport {
 }
 
 /// A number of the weights of a row that has them.
-pub(super) fn weight<V>(of: impl Fn(&WeightFigures) -> V) -> impl Fn(&EstimateRow) -> Option<V> {
+fn weight<V>(of: impl Fn(&WeightFigures) -> V) -> impl Fn(&EstimateRow) -> Option<V> {
     move |row| row.estimate.weights.as_ref().map(&of)
 }
 
 /// A column of numbers with three digits.
-pub(super) fn three_digits(name: &'static str) -> Column {
+fn three_digits(name: &'static str) -> Column {
     Column::from(name).digits(Digits::Significant(3))
 }
 
 /// Heading of what a row may be used for.
-pub(super) const USABLE: &str = "usable";
+const USABLE: &str = "usable";
 
 /// Three digits.
 pub(super) fn short(value: f64) -> String {
     significant(value, 3)
 }
 
-pub(super) fn interval_text(low: f64, high: f64, kind: IntervalKind) -> String {
+fn interval_text(low: f64, high: f64, kind: IntervalKind) -> String {
     match kind {
         IntervalKind::RuleOfThree => format!("≤ {}", short(high)),
         _ => format!("{} … {}", short(low), short(high)),
     }
 }
 
-/// `2.16 (1.5…3.1)`.
-pub(super) fn ratio_text(ratio: Option<Ratio>) -> String {
-    let end = |value: Option<f64>| value.map_or("∞".to_owned(), short);
-    let text = |r: Ratio| Some(format!("{} ({}…{}) {}", short(r.ratio?), end(r.low), end(r.high), r.verdict.mark()));
-    ratio.and_then(text).unwrap_or_else(|| "–".to_owned())
-}
-
-pub(super) fn rate_text(rate: Option<RiskRate>) -> String {
+fn rate_text(rate: Option<RiskRate>) -> String {
     rate.map_or("unknown".to_owned(), |r| {
         if r.estimate > 0.0 {
             format!("{} ({}…{})", short(r.estimate), short(r.low), short(r.high))

@@ -2,13 +2,12 @@
 
 use super::html::{Page, PageFigure, Section};
 use super::plot::{AxisScale, Figure, Mark, Plot, PlotAxis, Series, Value, is_few};
-use super::sampling::{SampleReport, USABLE, interval_text, rate_text, ratio_text, short, three_digits, weight};
+use super::sampling::SampleReport;
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::sampling::EstimateRow;
 use crate::support::readable::{count, count_of, value};
-use crate::support::table::{Column, Digits, NumberText};
 
 impl SampleReport {
     /// `report.html`, with the figures of the run.
@@ -52,42 +51,13 @@ impl SampleReport {
     }
 
     fn estimates_section(&self) -> Section {
-        let overall: Vec<&EstimateRow> = self
-            .estimates
-            .iter()
-            .filter(|r| r.is_overall(&self.estimates) || r.is_rare_beside(&self.estimates))
-            .collect();
-        let wide = |row: &EstimateRow| {
-            let percent = 100.0 * row.estimate.relative_half_width;
-            percent
-                .is_finite()
-                .then(|| NumberText(if percent < 1000.0 { format!("{percent:.1}") } else { "> 999".to_owned() }))
-        };
-        let estimates = self
-            .named(overall.iter().copied())
-            .column("runs", |row| row.estimate.runs)
-            .column("failures", |row| row.estimate.failures)
-            .column(three_digits("P"), |row| row.estimate.probability)
-            .column("interval", |EstimateRow { estimate: e, .. }| {
-                interval_text(e.interval.low, e.interval.high, e.interval.kind)
-            })
-            .column(Column::from("± in %").null("–"), wide)
-            .column("per hour", |row| rate_text(row.risk.per_hour))
-            .column("per 1000 km", |row| rate_text(row.risk.per_1000_km))
-            .column("P/S", |row| ratio_text(row.recorded.and_then(|recorded| recorded.sampled)))
-            .column(USABLE, |row| row.estimate.trust.usable())
-            .build();
+        let estimates = self.table(|r| r.is_overall(&self.estimates) || r.is_rare_beside(&self.estimates));
         let mut tables = vec![estimates.captioned(format!(
             "Probability of failure, and risk where the exposure is known. Intervals at {} %{}",
             value(100.0 * self.level()),
             self.interval_rule()
         ))];
-        let percent = |name, decimals| Column::from(name).digits(Digits::Fixed(decimals));
-        let weights = self
-            .weights(overall)
-            .column(percent("largest weight in %", 2), weight(|w| 100.0 * w.largest_fraction))
-            .column(percent("from draws of the density in %", 1), weight(|w| 100.0 * w.crude_fraction))
-            .build();
+        let weights = self.weights();
         if !weights.rows.is_empty() {
             tables.push(weights.captioned("Weights: how much of the sample counts"));
         }
@@ -95,10 +65,7 @@ impl SampleReport {
             .intro(format!(
                 "A rate is the recordings' where the density agrees with the recorded scenarios. It is carried by the \
                  scenarios that fail where these are effectively fewer than ten. ≤ bounds from above where nothing failed. \
-                 Probabilities below {} (one in {} scenarios) come from the tails of the density's kernels, not from data. \
                  {}",
-                short(1.0 / self.density.kernels as f64),
-                count_of(self.density.kernels),
                 self.rules().map(|rule| rule + ". ").collect::<String>()
             ))
             .tables(tables)

@@ -4,9 +4,9 @@
 use serde::Serialize;
 
 use super::sampling::{SampleReport, short};
-use crate::run::sampling::{Checkpoint, EstimateRow, RiskRate, Uncertainty};
+use crate::run::sampling::{Checkpoint, EstimateRow, RiskRate, TRAFFIC_DRAWS, Uncertainty};
 use crate::stats::estimate::{Ratio, Warning, WeightFigures};
-use crate::support::readable::{counted, significant};
+use crate::support::readable::{count, count_of, counted, significant};
 use crate::support::table::{NamedValue, Table};
 
 impl SampleReport {
@@ -34,7 +34,7 @@ impl SampleReport {
         let [hour, kilometres] = ["risk_per_hour", "risk_per_1000_km"];
         Table::of(&self.estimates)
             .column("category", |_| self.density.category.key())
-            .column("parameterization", |_| self.density.parameterization.as_str())
+            .column("variant", |_| self.density.parameterization.as_str())
             .column("estimator", |row| if row.estimate.weights.is_some() { "is" } else { self.options.estimator.key() })
             .column("model", |row| row.model.name())
             .column("criterion", |row| row.criterion.key())
@@ -52,6 +52,8 @@ impl SampleReport {
             .column("relative_half_width", |row| known(row.estimate.relative_half_width))
             .column("coefficient_of_variation", |row| known(row.estimate.coefficient_of_variation))
             .column("variance_reduction", |row| known(row.estimate.variance_reduction))
+            .column("no_traffic_fraction", |row| row.no_traffic.map(|of| of.fraction))
+            .column("possible_probability", |row| row.no_traffic.map(|of| of.possible_probability))
             .columns(weights, |(name, _)| name, |row, (_, of)| row.estimate.weights.as_ref().and_then(|w| known(of(w))))
             .columns(risks, |(end, _)| format!("{hour}{end}"), |row, (_, of)| per_hour(row).and_then(|r| known(of(&r))))
             .columns(
@@ -157,7 +159,16 @@ impl SampleReport {
 
     /// How to read the estimates, one sentence after the other.
     pub(super) fn rules(&self) -> impl Iterator<Item = String> {
-        [self.mean_rule(), self.exposure_rule(), self.sources_rule(), self.recorded_rule()].into_iter().flatten()
+        [
+            self.mean_rule(),
+            self.traffic_rule(),
+            self.exposure_rule(),
+            self.sources_rule(),
+            self.recorded_rule(),
+            self.tail_rule(),
+        ]
+        .into_iter()
+        .flatten()
     }
 
     /// What P over all headways averages; `None` for a single headway.
@@ -170,6 +181,30 @@ impl SampleReport {
                 self.headways.len(),
                 self.headways.join(", ")
             )
+        })
+    }
+
+    /// Which draws no traffic has; `None` if there are none.
+    fn traffic_rule(&self) -> Option<String> {
+        let fraction = self.estimates.iter().find_map(|row| row.no_traffic)?.fraction;
+        Some(format!(
+            "No such traffic in {} % of {} further draws: the vehicle that cuts out drives through the one ahead of it. P counts \
+             them; P possible, without interval, is that of the other draws",
+            significant(100.0 * fraction, 2),
+            count(TRAFFIC_DRAWS)
+        ))
+    }
+
+    /// A density of N scenarios is based on no data below a probability of 1/N; `None` where no row is below.
+    fn tail_rule(&self) -> Option<String> {
+        let kernels = self.density.kernels;
+        let is_below = self
+            .estimates
+            .iter()
+            .any(|row| row.is_overall(&self.estimates) && row.estimate.probability * (kernels as f64) < 1.0);
+        is_below.then(|| {
+            let (resolved, kernels) = (short(1.0 / kernels as f64), count_of(kernels));
+            format!("Probabilities below {resolved} (one in {kernels} scenarios) come from the tails of the density's kernels, not from data")
         })
     }
 

@@ -124,7 +124,7 @@ impl<'a> StudyReport<'a> {
         }
         if self.facts().categories.iter().any(|of| !of.folds.is_empty()) {
             let folds = self.facts().categories.iter().flat_map(|of| &of.folds);
-            let table = Table::of(folds).column("scenario", |(id, _)| id.as_str()).column("fold", |(_, fold)| *fold);
+            let table = Table::of(folds).column("id", |(id, _)| id.as_str()).column("fold", |(_, fold)| *fold);
             results.add("folds.csv", table.build().csv().as_bytes())?;
         }
         if let Some(comparison) = &self.comparison {
@@ -274,7 +274,7 @@ fn best(best: &Best) -> Value {
     serde_json::json!({
         "category": best.category.key(), "model": best.model.name(), "criterion": Criterion::Collision.key(),
         "s_failures": best.failures, "failing_scenarios": best.failing_scenarios,
-        "parameterization": score.map(|s| &s.variant), "f1": score.map(|s| s.f1),
+        "variant": score.map(|s| &s.variant), "f1": score.map(|s| s.f1),
         "f1_low": score.map(|s| s.interval.low), "f1_high": score.map(|s| s.interval.high),
         "hidden": score.map(|s| s.hidden), "not_told_apart": score.map(|s| &s.rivals),
         "more_data": score.map(|s| s.more_data).filter(|times| times.is_finite()),
@@ -298,7 +298,7 @@ fn published(scores: &ScoreTable) -> Value {
         cells().filter_map(move |(model, criterion)| {
             let theirs = published_lvd_f1(id.key, model, criterion)?;
             Some(serde_json::json!({
-                "category": id.category.key(), "parameterization": id.key, "model": model.name(),
+                "category": id.category.key(), "variant": id.key, "model": model.name(),
                 "criterion": criterion.key(), "f1": theirs,
             }))
         })

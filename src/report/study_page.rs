@@ -78,7 +78,8 @@ impl StudyReport<'_> {
             let (hours, kilometres) = (recording.driven_s / 3600.0, recording.driven_m / 1000.0);
             let (vehicles, hours, kilometres) = (count(recording.vehicles), value(hours), value(kilometres));
             let counts = format!("{vehicles} vehicles, {hours} h and {kilometres} km driven");
-            format!("{}: {counts}{}", recording.id, files.collect::<String>())
+            let preset = recording.preset.iter().map(|preset| format!("\n  preset {preset}"));
+            format!("{}: {counts}{}", recording.id, preset.chain(files).collect::<String>())
         };
         let mut recordings: Vec<String> = shown.map(line).collect();
         if facts.recordings.len() > MAX_RECORDINGS {

@@ -1,11 +1,13 @@
 //! The source of scenarios, and their provenance.
 
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
-use super::mining::{Collection, MiningOptions, leave_out_copies, mine_generated, mine_inputs};
+use super::mining::{Collection, MiningOptions, RecordingSummary, leave_out_copies, mine_generated, mine_inputs};
 use super::trajectory::Inputs;
 use super::trajectory::generator::GeneratorOptions;
 use super::trajectory::highd::made_up;
@@ -73,7 +75,8 @@ impl Source {
             Source::Scenarios(path) => {
                 let ScenarioFile { scenarios, problems, notes } = read_scenario_file(path, implausible)?;
                 let synthetic = scenarios.iter().any(|scenario| scenario.synthetic);
-                Collection { scenarios, problems, notes, synthetic, ..Collection::default() }
+                let read = Collection { scenarios, problems, notes, synthetic, ..Collection::default() };
+                read.with_record_of(path)?
             }
             Source::Recordings { path, preset } => {
                 mine_inputs(Inputs::of(path, preset.as_deref())?, mining, implausible, done)?
@@ -97,7 +100,7 @@ impl Source {
             driven: collection.driven(),
         };
         if let Source::Scenarios(path) = self
-            && let Some(beside) = DataProvenance::read_beside(path, &provenance.scenarios_sha256)?
+            && let Some((beside, _)) = DataProvenance::read_beside(path, &provenance.scenarios_sha256)?
         {
             provenance.driven = beside.driven;
             if beside.synthetic {
@@ -123,7 +126,40 @@ impl Source {
     }
 }
 
+/// What `mine` knows of its recordings. It stands beside the scenario file, and in the records of a study of that file.
+#[derive(Serialize, Deserialize)]
+struct MinedRecord {
+    recordings: Vec<RecordingSummary>,
+    notes: Vec<String>,
+    left_out: Vec<String>,
+    mining: MiningOptions,
+}
+
 impl Collection {
+    /// What these recordings were, for the file beside the scenarios.
+    pub fn record(&self, mining: &MiningOptions) -> Value {
+        let left_out = self.problems.iter().map(ToString::to_string).collect();
+        let (recordings, notes) = (self.recordings.clone(), self.notes.clone());
+        json!(MinedRecord { recordings, notes, left_out, mining: mining.clone() })
+    }
+
+    /// Adds what `mine` wrote beside a scenario file. A record of other scenarios is a note.
+    fn with_record_of(mut self, path: &Path) -> Result<Collection> {
+        match DataProvenance::read_beside(path, &input_file::sha256(path)?) {
+            Ok(Some((beside, mined))) => {
+                self.synthetic |= beside.synthetic;
+                if let Ok(MinedRecord { recordings, notes, left_out, mining }) = serde_json::from_value(mined) {
+                    let left_out = left_out.into_iter().map(|text| format!("left out by `mine`: {text}"));
+                    self.notes.extend(notes.into_iter().chain(left_out));
+                    (self.recordings, self.mining) = (recordings, Some(mining));
+                }
+            }
+            Ok(None) => {}
+            Err(error) => self.notes.push(format!("the recordings of these scenarios are unknown: {error}")),
+        }
+        Ok(self)
+    }
+
     /// Sum over all ego data sets of the recordings used; `None` for scenarios without recordings.
     pub fn driven(&self) -> Option<Driven> {
         let hours = self.recordings.iter().map(|r| r.driven_s).sum::<f64>() / 3600.0;

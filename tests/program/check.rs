@@ -144,7 +144,7 @@ fn each_clause_has_its_demand_beside_the_drivers() {
         + UN R157, 5.2.5.2: no demand: (b)
         cut-in 60 45 7.2 1 --profiles un-r157,eu-2022-1426,eu-2022-1426-standing = 0
         + UN R157, 5.2.5.2: no demand: (c) TTC at lane intrusion is 0.628 s; the clause applies where it is > 0.6972 s
-        + EU 2022/1426, 1.4.2: the system has to avoid the collision (robust)
+        + EU 2022/1426, 1.4.2: the system has to avoid the collision (lane intrusion by a front tyre 0.1 m within
         + EU 2022/1426, 1.4.2, standing: no demand: (c)
         # These profiles drop condition (b), so the regulation's clause is not judged.
         cut-in 60 40 15 1 --profiles paper = 0
@@ -197,7 +197,8 @@ fn braking_on_a_gap_that_opened_begins_a_delay_after_the_reaction() {
 }
 
 /// FSM finds both vehicles unsafe from the start and brakes for the nearer one, which leaves; with the larger demand it stops.
-/// A driver that tests the TTC once sees no danger at 40 m: it is above 2 s then.
+/// A driver that tests the TTC once sees no danger at 40 m: it is above 2 s then. 30 km/h faster, the system has to avoid the
+/// collision from 1.044 s of TTC on at the intrusion: 1.084 s 18.2 m ahead, 0.1 s less where the front tyre counts.
 #[test]
 fn what_another_reading_turns_is_named_and_not_called_robust() {
     agree(
@@ -208,12 +209,15 @@ fn what_another_reading_turns_is_named_and_not_called_robust() {
         - robust: no change
         cut-in 60 20 40 1 = 0
         + the verdict of CCHDM rests on a reading
-        + Annex 3 is silent: CCHDM tests TTC ≤ 2 s until it holds, not once
+        + Rests on a reading: CCHDM tests TTC ≤ 2 s until it holds, not once
         - robust: no change
         cut-in 60 20 30 1 = 0
         + robust: no change
         + CCHDM tests TTC once
         - Rests on a reading
+        cut-in 100 70 18.2 1 = 0
+        + 5.2.5.2: the system has to avoid the collision (lane intrusion by a front tyre 0.1 m within the box turns this)
+        + not a front tyre 0.1 m within it
         ",
     );
     let of = |case: &str, reading: &str, rule: &str| {

@@ -202,13 +202,24 @@ fn the_answers_of_a_table_go_to_a_table_in_the_order_of_the_file() {
     // The numbers of every driver are those of `simulate`, and the time of braking that of the sheet.
     let answers = document(dir, "check cases.csv");
     let sheet = document(dir, "check cases.csv --row 2 --profiles un-r157");
-    let names = "min_gap_m min_ttc_s max_btn reaction_s braking_s contact_s impact_closing_speed_mps";
-    for model in sheet["profiles"][0]["models"].as_array().unwrap() {
-        for name in words(names) {
+    let lanes = document(dir, "simulate --table cases.csv --row 2 --profile un-r157");
+    for (model, lane) in
+        std::iter::zip(sheet["profiles"][0]["models"].as_array().unwrap(), lanes["lanes"].as_array().unwrap())
+    {
+        let mut numbers = lane["outcome"].as_object().unwrap().clone();
+        numbers.insert("braking_s".to_owned(), model["braking_s"].clone());
+        assert!(model["model"] == lane["model"] && numbers.len() == 19, "{numbers:?}");
+        for (name, number) in numbers {
             let key = format!("{}_{name}", model["model"].as_str().unwrap());
-            assert_eq!(answers["cases"][1][&key], model[name], "{key}");
+            assert_eq!(answers["cases"][1][&key], number, "{key}");
         }
     }
+    assert_eq!(said(dir, "check cases.csv --nominal --rows nominal.csv").0, 4);
+    let nominal = std::fs::read_to_string(dir.join("nominal.csv")).unwrap();
+    assert!(
+        nominal.starts_with("row,id,verdict,Reg157,CCHDM,RSS,FSM,note,rests_on\n"),
+        "no column that no row fills: {nominal}"
+    );
     refused(dir, "check cases.csv --row 2 --rows answers.csv", 2, "--rows");
 }
 

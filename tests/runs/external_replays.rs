@@ -20,7 +20,7 @@ fn s_prime_of_other_programs_and_of_bases_of_other_folds_are_scored() {
     let row = |name: &str| variants.lines().find(|line| line.starts_with(&format!("cut_in,{name},"))).unwrap();
     assert_eq!(row("my-same-v2"), "cut_in,my-same-v2,0,1,1,1,synthetic", "{variants}");
     row("5-cv");
-    assert_eq!(std::fs::read_to_string(of("study/folds.csv")).unwrap().lines().next(), Some("scenario,fold"));
+    assert_eq!(std::fs::read_to_string(of("study/folds.csv")).unwrap().lines().next(), Some("id,fold"));
     #[cfg(feature = "parquet")]
     {
         ran(dir.path(), "-q mine recordings --out as-parquet.parquet");

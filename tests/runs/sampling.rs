@@ -11,8 +11,8 @@ use lanesweep::engine::{Backend, CpuBackend, Headway, LanePlan, SampleTally, Wan
 use lanesweep::model::driver::MODELS;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, plan_samples};
-use lanesweep::scenario::Category;
-use lanesweep::stats::density::{DensityModel, Kde, read_density, write_density};
+use lanesweep::scenario::{Category, Driven};
+use lanesweep::stats::density::{DensityModel, Exposure, Kde, read_density, write_density};
 
 fn density(category: Category, key: &str) -> DensityModel {
     fitted(scenarios(), category, key, false)
@@ -130,7 +130,7 @@ fn a_run_in_parts_is_the_run_in_one_and_its_failing_lanes_are_the_first_of_all_r
     assert!(read("seven.csv") == seven && read("counted.csv") == seven, "the first seven");
     // A row says how to run its lane again, and it is the same lane.
     for row in table(&dir.join("seven.csv")).iter().step_by(9) {
-        let key = format!("#{}/{}/{}/{}", row["sample"], row["parameterization"], row["headway"], row["model"]);
+        let key = format!("#{}/{}/{}/{}", row["sample"], row["variant"], row["headway"], row["model"]);
         let (code, trace, summary) = program::lanesweep(dir, &["simulate", "--from", "whole", "--lane", &key]);
         assert!(code == 0 && trace.starts_with("t_s,"), "{summary}");
         for (name, column) in [("Collision", "collision"), ("TTC", "ttc"), ("BTN", "btn")] {
@@ -153,6 +153,46 @@ fn rows_hold_every_lane_of_a_reduced_density_with_its_point() {
     let estimates = estimates(dir.path(), "lanesweep-sample");
     let row = estimates.lines().find(|line| line.contains("mc,FSM,collision,0.6s")).unwrap();
     assert_eq!(row.split(',').nth(7).unwrap(), failed.to_string());
+}
+
+/// The vehicle that cuts out drives through the one ahead where it is still in its path when their gap is used up. Of the density's
+/// draws these are counted apart; nothing has a rate per hour, as the headway is imposed.
+#[test]
+fn draws_of_cut_outs_that_no_traffic_has_are_counted_apart_and_imposed_headways_have_no_rate() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let mut density = density(Category::CutOut, "a");
+    density.exposure = Some(Exposure::new(40, Driven { hours: Some(10.0), kilometres: Some(800.0) }));
+    write_density(&dir.join("d.json"), &density).unwrap();
+    let text = ran(dir, "-q sample d.json --samples 20000 --thw 0.6 --models FSM --rows rows.csv --backend cpu");
+    let sizes = &density.sizes;
+    let widths = sizes.target.width_m + sizes.lead.unwrap().width_m;
+    let rows = table(&dir.join("rows.csv"));
+    let mut count = [[0.0_f64; 2]; 2];
+    for row in &rows {
+        let [target, lead, across, gap] = ["v_target_mps", "v_lead_mps", "lateral_speed_mps", "gap_lead_m"]
+            .map(|name| row[name].parse::<f64>().unwrap());
+        let is_possible = gap - (target - lead) * (widths / 2.0 / across) >= 0.0;
+        count[usize::from(is_possible)][usize::from(row["collision"] == "1")] += 1.0;
+    }
+    let [fraction, possible] =
+        [(count[0][0] + count[0][1]) / rows.len() as f64, count[1][1] / (count[1][0] + count[1][1])];
+    let record = json(&dir.join("lanesweep-sample/estimate.json"))["estimates"][0].clone();
+    let near = |key: &str, ours: f64| {
+        let theirs = record["no_traffic"][key].as_f64().unwrap();
+        assert!((theirs - ours).abs() < 0.01 && ours > 0.0, "{key}: {theirs} beside {ours}");
+    };
+    near("fraction", fraction);
+    near("possible_probability", possible);
+    let page = std::fs::read_to_string(dir.join("lanesweep-sample/report.html")).unwrap();
+    assert!(
+        [&text, &page]
+            .iter()
+            .all(|of| of.contains("P possible") && !of.contains("per 1000 km</th") && !of.contains("per hour |")),
+        "{text}"
+    );
+    let csv = table(&dir.join("lanesweep-sample/estimates.csv"));
+    assert!(csv.iter().all(|row| row["risk_per_hour"].is_empty()) && record["risk"]["per_hour"].is_null());
 }
 
 fn estimates(dir: &Path, folder: &str) -> String {

@@ -3,7 +3,7 @@
 #![cfg(feature = "parquet")]
 
 use crate::common::mined::{fitted, scenarios_of};
-use crate::common::program::{ran, refused};
+use crate::common::program::{json, ran, refused};
 use crate::common::tables::made;
 
 use std::collections::BTreeMap;
@@ -105,6 +105,24 @@ fn a_study_gives_the_same_bytes_from_parquet_and_from_json_lines() {
     let scenarios = read(&at.join("s.parquet"));
     check_facts(&scenarios, "scenarios", false);
     assert_eq!(scenarios.key_values["lanesweep.synthetic"], "true");
+    // What `mine` knew of its recordings stands in the records of a study of either file; of other scenarios it is a note.
+    let record = |data: &str| {
+        ran(at, &format!("{study} {data} --models FSM --thw 0.6 --out of"));
+        let record = json(&at.join("of/run.json"));
+        ["recordings", "mining", "notes"].map(|key| record[key].clone())
+    };
+    let recorded = record("rec");
+    assert!(
+        recorded[0].as_array().unwrap().iter().all(|of| of["files"].as_array().unwrap().len() == 3),
+        "{recorded:?}"
+    );
+    for file in ["s.jsonl", "s.parquet"] {
+        assert_eq!(record(&format!("--scenarios {file} --config mining.leader_max_thw_s=9")), recorded, "{file}");
+    }
+    std::fs::write(at.join("t.jsonl"), std::fs::read_to_string(at.join("s.jsonl")).unwrap() + "\n").unwrap();
+    std::fs::copy(at.join("s.exposure.json"), at.join("t.exposure.json")).unwrap();
+    let [recordings, _, notes] = record("--scenarios t.jsonl");
+    assert!(recordings == serde_json::json!([]) && notes.to_string().contains("belongs to other scenarios"), "{notes}");
     // A density of the same scenarios, of either file: its exposure stands beside each.
     for file in ["s.jsonl", "s.parquet"] {
         ran(at, &format!("-q fit --scenarios {file} --categories lvd --parameterizations i --out {file}.json"));

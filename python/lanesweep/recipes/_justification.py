@@ -62,7 +62,7 @@ def justification(
         raise ValueError(f"there is no {', '.join(unknown)}; there are {', '.join(scores)}")
     inside = {name: _within(scores[name], ends) for name, ends in (limits or {}).items()}
     rows_of = [(name, variant, *value, inside.get(name)) for name, value in scores.items()]
-    schema = {"quantity": pl.String, "parameterization": pl.String, "value": pl.Float64, "low": pl.Float64, "high": pl.Float64, "within": pl.String}
+    schema = {"quantity": pl.String, "variant": pl.String, "value": pl.Float64, "low": pl.Float64, "high": pl.Float64, "within": pl.String}
     hidden = both.filter(one & ~other).sort("impact_speed_mps", "min_ttc_s", descending=[True, False], nulls_last=True)
     return Justification(pl.DataFrame(rows_of, schema, orient="row").fill_nan(None), hidden)
 

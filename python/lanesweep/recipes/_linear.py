@@ -61,7 +61,7 @@ def found_emphasis(
     series, numbers = _LAYOUT[category]
     data: Any = rows
     folds = table(_verbs.study(scenarios=data, cross_validate=True).table("folds"))
-    fold = rows.join(folds, left_on="id", right_on="scenario", how="left", maintain_order="left")["fold"].to_numpy()
+    fold = rows.join(folds, on="id", how="left", maintain_order="left")["fold"].to_numpy()
     start = [0.0] * (KNOTS * len(series) + len(numbers))
     search = cma.CMAEvolutionStrategy(start, 0.7, {"popsize": 12, "seed": seed, "bounds": [-8, 8], "verbose": -9})
     best: tuple[Array, float] = (np.array(start), 0.0)

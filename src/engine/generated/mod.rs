@@ -38,6 +38,12 @@ impl Generator {
         self.points.draw(index, |point| decode::is_valid(&self.recipe, &self.basis, point))
     }
 
+    /// The point of a sample index as the estimators take it; `None` if it is void.
+    pub fn point(&self, index: u64) -> Option<Vec<f64>> {
+        let drawn = self.draw(index);
+        (!drawn.is_void()).then(|| drawn.values[..self.points.dimensions].iter().map(|v| f64::from(*v)).collect())
+    }
+
     /// The case of a sample index; its series are appended to `tables`.
     pub fn case<R: Real>(&self, index: u64, tables: &mut Tables<R>) -> LaneCase<R> {
         let drawn = self.draw(index);

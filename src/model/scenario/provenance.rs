@@ -55,6 +55,8 @@ pub struct DataProvenance {
 }
 
 const VERSION: u64 = 1;
+/// A recording takes half a kilobyte.
+const MAX_BYTES: u64 = 64 << 20;
 
 /// The provenance file of a scenario file.
 #[derive(Serialize, Deserialize)]
@@ -68,6 +70,9 @@ struct ProvenanceFile {
     /// Options of the command that mined the scenarios, for readers; files of earlier versions have none.
     #[serde(default, skip_serializing_if = "Value::is_null")]
     settings: Value,
+    /// What `mine` knew of the recordings; files of earlier versions have none.
+    #[serde(default, skip_serializing_if = "Value::is_null")]
+    mined: Value,
 }
 
 impl DataProvenance {
@@ -89,12 +94,12 @@ impl DataProvenance {
         remove_file(&Self::path_of(scenarios))
     }
 
-    /// Writes the provenance file of a scenario file atomically, with the options of the command; nothing if time and
-    /// distance are unknown.
+    /// Writes the provenance file of a scenario file atomically, with the options of the command and what it knew of the
+    /// recordings; nothing if time and distance are unknown.
     ///
     /// # Errors
     /// [`Error::Io`] if the folder cannot be written to.
-    pub fn write_beside(&self, scenarios: &Path, settings: Value) -> Result<()> {
+    pub fn write_beside(&self, scenarios: &Path, settings: Value, mined: Value) -> Result<()> {
         let Some(driven) = self.driven else { return Ok(()) };
         let file = ProvenanceFile {
             lanesweep_exposure: VERSION,
@@ -103,20 +108,21 @@ impl DataProvenance {
             synthetic: self.synthetic,
             driven,
             settings,
+            mined,
         };
         let text = serde_json::to_string_pretty(&file);
         let text = text.map_err(|e| Error::Internal(format!("cannot be written as JSON: {e}")))?;
         write_atomically(&Self::path_of(scenarios), format!("{text}\n").as_bytes())
     }
 
-    /// Reads the provenance file of a scenario file; `None` if there is none.
+    /// Reads the provenance file of a scenario file, and what `mine` knew of the recordings; `None` if there is none.
     ///
     /// # Errors
     /// [`Error::Io`] if it exists and cannot be read; [`Error::Input`] if it is damaged, of another version, or belongs
     /// to scenarios with another checksum than `scenarios_sha256`.
-    pub fn read_beside(scenarios: &Path, scenarios_sha256: &str) -> Result<Option<DataProvenance>> {
+    pub fn read_beside(scenarios: &Path, scenarios_sha256: &str) -> Result<Option<(DataProvenance, Value)>> {
         let path = Self::path_of(scenarios);
-        let text = match input_file::read(&path, input_file::MAX_SETTINGS_BYTES) {
+        let text = match input_file::read(&path, MAX_BYTES) {
             Err(Error::Io { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             read => read?,
         };
@@ -144,7 +150,7 @@ impl DataProvenance {
         if content.driven.validate().is_err() {
             return wrong(Place::file(&path).column("driven"), "hours and kilometres are not above 0".to_owned());
         }
-        let ProvenanceFile { scenarios_sha256, data, synthetic, driven, .. } = content;
-        Ok(Some(DataProvenance { scenarios_sha256, data, synthetic, driven: Some(driven) }))
+        let ProvenanceFile { scenarios_sha256, data, synthetic, driven, mined, .. } = content;
+        Ok(Some((DataProvenance { scenarios_sha256, data, synthetic, driven: Some(driven) }, mined)))
     }
 }

@@ -115,6 +115,12 @@ pub(super) fn readings_where_silent(profile: &Profile, subject: &Subject) -> Res
             let brakes = format!("CCHDM brakes until the speeds are equal, not only while TTC ≤ {ttc_s} s (ours)");
             let instead = "cchdm.cut_in_braking = while-unsafe";
             other(brakes, instead, &|other| other.cchdm.cut_in_braking = CutInBraking::WhileUnsafe);
+            if profile.reg157.lane_intrusion_m > 0.0 {
+                let tyre =
+                    "the vehicle's box is the first to intrude into the lane, not a front tyre 0.1 m within it (ours)";
+                let instead = "front tyre 0.1 m within the box";
+                other(tyre.to_owned(), instead, &|other| other.reg157.lane_intrusion_m += 0.1);
+            }
             let sentence =
                 format!("CCHDM tests TTC ≤ {ttc_s} s until it holds, not once at the end of perception (ours)");
             all.push(Reading { sentence, instead: "CCHDM tests TTC once", profile: profile.clone(), tests_once: true });

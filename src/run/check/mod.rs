@@ -89,6 +89,8 @@ pub struct Judgement {
     pub silent: Vec<String>,
     /// Whether such an alternative changes the answer.
     pub reading_turns_answer: bool,
+    /// Whether such an alternative changes what the clause of cut-ins demands.
+    pub reading_turns_demand: bool,
     /// The reference drivers whose verdict such an alternative changes.
     pub reading_turns: Vec<ModelId>,
     /// The clauses applied to the case.
@@ -279,10 +281,11 @@ impl Check {
         });
         let unreacting = lane.unreacting(profile, self.subject.category());
         let attends_at_once = annex::attends_at_once(profile, self.subject.category(), &lane);
-        let (mut silent, turned) = self.silent(profile, &changed[0].verdicts, &budget)?;
+        let (mut silent, turned) = self.silent(profile, &changed[0], &budget)?;
         silent.extend(attends_at_once.map(str::to_owned));
         let is = &changed[0].verdicts;
-        let turns = |model: &&ModelId| turned.iter().any(|other| other.collides(**model) != is.collides(**model));
+        let turns =
+            |model: &&ModelId| turned.iter().any(|other| other.verdicts.collides(**model) != is.collides(**model));
         Ok(Judgement {
             profile: profile.name.clone(),
             models: models.collect(),
@@ -296,7 +299,8 @@ impl Check {
             outside_annex: annex::outside(profile, self.subject.category(), self.subject.point()),
             annex_flips: flips(&changed, |changed| changed.verdicts.is_outside_annex),
             silent,
-            reading_turns_answer: turned.iter().any(|other| other.answer() != is.answer()),
+            reading_turns_answer: turned.iter().any(|other| other.verdicts.answer() != is.answer()),
+            reading_turns_demand: turned.iter().any(|other| other.demand != changed[0].demand),
             reading_turns: is.reference_drivers.iter().filter(turns).copied().collect(),
             readings: clauses::readings(
                 profile,
@@ -336,17 +340,14 @@ impl Check {
     }
 
     /// Interpretations where the regulation is silent on which the answer depends, and the verdicts with the other ones.
-    fn silent(
-        &self,
-        profile: &Profile,
-        is: &CaseVerdicts,
-        budget: &StepBudget,
-    ) -> Result<(Vec<String>, Vec<CaseVerdicts>)> {
-        let mut all: (Vec<String>, Vec<CaseVerdicts>) = Default::default();
+    fn silent(&self, profile: &Profile, is: &Changed, budget: &StepBudget) -> Result<(Vec<String>, Vec<Changed>)> {
+        let mut all: (Vec<String>, Vec<Changed>) = Default::default();
         for other in annex::readings_where_silent(profile, &self.subject)? {
-            let found = self.changed("", &other.profile, self.subject.point(), other.tests_once, budget)?.verdicts;
-            let turns = |model: &ModelId| found.collides(*model) != is.collides(*model);
-            if found.answer() != is.answer() || is.reference_drivers.iter().any(turns) {
+            let found = self.changed("", &other.profile, self.subject.point(), other.tests_once, budget)?;
+            let (theirs, ours) = (&found.verdicts, &is.verdicts);
+            let turns = |model: &ModelId| theirs.collides(*model) != ours.collides(*model);
+            let turns_driver = ours.reference_drivers.iter().any(turns);
+            if theirs.answer() != ours.answer() || found.demand != is.demand || turns_driver {
                 if !all.0.contains(&other.sentence) {
                     all.0.push(other.sentence);
                 }

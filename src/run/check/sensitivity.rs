@@ -40,7 +40,9 @@ impl Check {
             RuleVerdicts { reading, verdicts }
         };
         let mut all = vec![rules(None, is, touching)];
-        for other in annex::readings_where_silent(profile, &self.subject)? {
+        let readings = annex::readings_where_silent(profile, &self.subject)?;
+        // Another lane intrusion turns what the clause demands, and no reference driver.
+        for other in readings.into_iter().filter(|other| other.profile.reg157 == profile.reg157) {
             let changed = self.perturbed(&other.profile, other.tests_once, budget)?;
             all.push(rules(Some(other.instead), &changed, &self.touching(&changed, &other.profile)?));
         }

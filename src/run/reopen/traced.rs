@@ -76,7 +76,7 @@ impl TracedCase {
         };
         TracedLanes {
             lanes: self.traces.into_iter().map(lane).collect(),
-            origin: format!("profile {}, f64, a case of flags", profile.name),
+            origin: format!("profile {}, f64, one case", profile.name),
             is_synthetic: false,
         }
     }

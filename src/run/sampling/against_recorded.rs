@@ -2,14 +2,20 @@
 //! replayed under the parameterization (S'). The interval of P includes the uncertainty of draws and data. The error of
 //! the parameterization itself is visible only in this comparison.
 
+use rayon::prelude::*;
+use serde::Serialize;
+
 use super::Sample;
 use super::estimate_rows::{EstimateRow, RecordedRatios};
+use super::plan::{plan_draws, plan_points};
 use super::result::SampleResult;
 use super::sample_options::SampleHeadways;
-use crate::engine::{CpuBackend, Executor, Headway, KernelCounts, Wanted, cell_of};
+use crate::engine::{CpuBackend, Executor, Headway, KernelCounts, LanePlan, Verdicts, Wanted, cell_of};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
+use crate::random::Stream;
 use crate::run::study::{StudyOptions, plan_study};
+use crate::scenario::Category;
 use crate::stats::density::DensityModel;
 use crate::stats::estimate::{Clusters, Ratio, RatioVerdict, Warning, paired_ratio};
 use crate::{Error, Result};
@@ -38,14 +44,7 @@ fn replay(
     };
     let Some(block) = plan.blocks.first() else { return Ok(None) };
     let Some(variant) = block.variants.iter().position(|name| *name == id.key) else { return Ok(None) };
-    // The CPU gives the same bits as any device, and there are few lanes compared with those of the samples.
-    let backend = CpuBackend::lane_arithmetic();
-    let executor = Executor::new(&backend);
-    let mut verdicts = Vec::new();
-    executor.sweep(&plan, 0..plan.unit_count(), Wanted::Verdicts, |chunk| {
-        verdicts.extend(chunk.verdicts.iter().copied());
-        Ok(())
-    })?;
+    let verdicts = verdicts(&plan)?;
     let (variants, lanes) = (block.variants.len(), headways.len() * models.len());
     let units = block.units.len() as usize;
     let counted = |variant: usize| {
@@ -58,8 +57,32 @@ fn replay(
     Ok(Some([counted(0), counted(variant)]))
 }
 
+/// The verdicts of all lanes, by the CPU: it gives the same bits as any device, and they are few beside those of the samples.
+fn verdicts(plan: &LanePlan) -> Result<Vec<Verdicts>> {
+    let (backend, mut verdicts) = (CpuBackend::lane_arithmetic(), Vec::new());
+    Executor::new(&backend).sweep(plan, 0..plan.unit_count(), Wanted::Verdicts, |chunk| {
+        verdicts.extend(chunk.verdicts.iter().copied());
+        Ok(())
+    })?;
+    Ok(verdicts)
+}
+
+/// Number of further draws of a cut-out that are examined.
+pub const TRAFFIC_DRAWS: u64 = 20_000;
+const PURPOSE: u32 = 0x7261_6666;
+
+/// What draws without possible traffic are of an estimate: the vehicle that cuts out drives through the one ahead of it. Maps and
+/// tables of cases leave them out by the same rule.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct NoTraffic {
+    /// Their fraction of the draws.
+    pub fraction: f64,
+    /// The probability that a draw with possible traffic fails.
+    pub possible_probability: f64,
+}
+
 impl Sample {
-    /// Adds the rates of the recorded scenarios to the result. Adds a warning if the rates differ, if there are too few
+    /// Adds the rates of the recorded scenarios to the result, and what draws without possible traffic are of it. Adds a warning if the rates differ, if there are too few
     /// failures, or if the density does not contain its scenarios.
     ///
     /// # Errors
@@ -71,6 +94,7 @@ impl Sample {
             SampleHeadways::Each(headways) => headways.clone(),
             SampleHeadways::Sampled => vec![Headway::Observed],
         };
+        self.count_no_traffic(&mut result.rows, &headways)?;
         let is_comparable = !density.scenarios.is_empty();
         let replayed = is_comparable.then(|| replay(density, &self.profile, &options.models, &headways));
         let Some([recorded, replayed]) = replayed.transpose()?.flatten() else {
@@ -91,6 +115,44 @@ impl Sample {
             row.recorded = Some(ratios);
         }
         Ok(result)
+    }
+
+    /// Adds to rows of cut-outs what draws without possible traffic are of them.
+    ///
+    /// # Errors
+    /// Those of the lanes.
+    fn count_no_traffic(&self, rows: &mut [EstimateRow], headways: &[Headway]) -> Result<()> {
+        let (density, profile, options) = (&self.density, &self.profile, &self.options);
+        if density.category() != Category::CutOut {
+            return Ok(());
+        }
+        let stream = Stream { seed: options.seed, purpose: PURPOSE };
+        let plan = plan_draws(density, stream, profile, TRAFFIC_DRAWS, &options.models, &options.headways)?;
+        let Some(generator) = plan.generator() else { return Ok(()) };
+        let is_possible = |index| {
+            let point = generator.point(index)?;
+            let case = density.space.case(&point, &density.sizes, profile.frame.dt_s).ok()?;
+            Some((case.drives_through_s(profile).is_none(), point))
+        };
+        let drawn: Vec<(bool, Vec<f64>)> = (0..TRAFFIC_DRAWS).into_par_iter().filter_map(is_possible).collect();
+        let draws = drawn.len() as f64;
+        let points: Vec<Vec<f64>> =
+            drawn.into_iter().filter_map(|(is_possible, of)| (!is_possible).then_some(of)).collect();
+        if points.is_empty() {
+            return Ok(());
+        }
+        let plan = plan_points(density, &points, profile, &options.models, &options.headways)?;
+        let lanes = plan.headways.len() * options.models.len();
+        let mut counts = KernelCounts::zero(1, lanes);
+        verdicts(&plan)?.chunks(lanes).for_each(|of_sample| counts.count_sample(0, of_sample));
+        let fraction = points.len() as f64 / draws;
+        for row in rows {
+            let cells = cells_of(row, &options.models, headways);
+            let failing = counts.over(&cells).1[0] as f64 / (draws * cells.len() as f64);
+            let possible_probability = ((row.estimate.probability - failing) / (1.0 - fraction)).max(0.0);
+            row.no_traffic = Some(NoTraffic { fraction, possible_probability });
+        }
+        Ok(())
     }
 }
 

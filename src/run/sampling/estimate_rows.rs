@@ -3,6 +3,7 @@
 
 use serde::Serialize;
 
+use super::against_recorded::NoTraffic;
 use super::sample_options::SampleOptions;
 use super::uncertainty::Uncertainty;
 use crate::engine::{LanePlan, SampleTally, cell_of};
@@ -35,6 +36,8 @@ pub struct EstimateRow {
     pub uncertainty: Option<Uncertainty>,
     /// Ratios to the rate of the recorded scenarios; `None` if the density does not contain them.
     pub recorded: Option<RecordedRatios>,
+    /// What draws without possible traffic are of it; `None` where every draw is possible.
+    pub no_traffic: Option<NoTraffic>,
 }
 
 /// Ratios of failure rates to that of S, over the same scenarios, headways, model and criterion.
@@ -77,6 +80,7 @@ impl EstimateRow {
             risk,
             uncertainty: None,
             recorded: None,
+            no_traffic: None,
         }
     }
 

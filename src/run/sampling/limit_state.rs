@@ -130,12 +130,7 @@ impl LimitState for LaneLimitState<'_> {
                 if !self.questions.iter().any(failed) {
                     continue;
                 }
-                let drawn = generator.draw(index);
-                if drawn.is_void() {
-                    continue;
-                }
-                let values = &drawn.values[..generator.points.dimensions];
-                let point = values.iter().map(|value| f64::from(*value)).collect();
+                let Some(point) = generator.point(index) else { continue };
                 failures.push(Failure { index, point, fails: self.questions.iter().map(failed).collect() });
             }
             Ok(())

@@ -19,6 +19,7 @@ mod sample_run;
 mod uncertainty;
 mod weighted;
 
+pub use against_recorded::{NoTraffic, TRAFFIC_DRAWS};
 pub use cheaper_estimator::Choice;
 pub use crude::{Checkpoint, CheckpointRow, CrudeRun};
 pub use estimate_rows::{EstimateRow, RecordedRatios, Risk, RiskRate};

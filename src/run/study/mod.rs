@@ -171,7 +171,7 @@ impl StudyBuilder<'_> {
             left_out: collection.problems.iter().chain(cases.left_out()).map(Error::to_string).collect(),
             notes: collection.notes.clone(),
             recordings: collection.recordings.clone(),
-            mining,
+            mining: collection.mining.clone().unwrap_or(mining),
             parameterization: options.parameterization,
             score,
         };

@@ -59,6 +59,8 @@ pub struct Collection {
     pub notes: Vec<String>,
     /// At least one recording is synthetic, so results say nothing about real traffic.
     pub synthetic: bool,
+    /// Mining options of a scenario file, as `mine` recorded them.
+    pub mining: Option<MiningOptions>,
 }
 
 impl Collection {

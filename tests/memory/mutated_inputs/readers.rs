@@ -127,7 +127,7 @@ fn scenarios(name: &str, bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -
 
 fn exposure(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {
     file(bytes, dir, "s.exposure.json");
-    if let Some(read) = DataProvenance::read_beside(&dir.join("s.jsonl"), "00")? {
+    if let Some((read, _)) = DataProvenance::read_beside(&dir.join("s.jsonl"), "00")? {
         Exposure::new(3, read.driven.unwrap());
     }
     Ok(())

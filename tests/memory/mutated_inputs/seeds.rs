@@ -186,7 +186,9 @@ impl Seeds {
             [&few[..], &few[..1], &few[4..5]].map(|s| written(|path| write_scenarios(path, s).unwrap()));
         let exposure_file = {
             let dir = tempfile::tempdir().unwrap();
-            exposure.write_beside(&dir.path().join("s.jsonl"), serde_json::Value::Null).unwrap();
+            exposure
+                .write_beside(&dir.path().join("s.jsonl"), serde_json::Value::Null, serde_json::Value::Null)
+                .unwrap();
             std::fs::read(dir.path().join("s.exposure.json")).unwrap()
         };
         let plan_file = {
