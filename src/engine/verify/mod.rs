@@ -158,7 +158,7 @@ impl GroupComparison {
 /// A lane whose words differ.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DifferingLane {
-    /// Key, for `lanesweep verify --lane KEY`.
+    /// Key in its set.
     pub key: String,
     /// On the backend under test.
     pub tested: Outcome<f64>,
