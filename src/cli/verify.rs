@@ -8,7 +8,7 @@ use super::format::FormatFlag;
 use super::source::SourceFlags;
 use super::{Exit, Output};
 use crate::engine::LanePlan;
-use crate::engine::verify::{RandomOptions, ThresholdOptions, compare, random_plan, threshold_plan};
+use crate::engine::verify::{SetOptions, compare, random_plan, threshold_plan};
 use crate::model::profile::Profile;
 use crate::report::{records, verification};
 use crate::run::study::{StudyOptions, plan_study};
@@ -54,11 +54,12 @@ impl Verify {
         if is_text {
             console::print(&head)?;
         }
+        let set = |size| SetOptions { seed: self.seed, size, ..SetOptions::default() };
         let mut sets = Vec::new();
         let (mut equal, mut lanes, mut differing) = (true, 0, 0);
         for (name, plan) in [
-            ("Random lanes", self.random(&profile)?),
-            ("Lanes on thresholds", self.thresholds(configured, &profile)?),
+            ("Random lanes", random_plan(&profile, &set(self.random_lanes))?),
+            ("Lanes on thresholds", threshold_plan(&profile, &set(configured.settings.verify.threshold_units))?),
             ("Study", self.study(configured, &profile)?),
         ] {
             let comparison = configured.with_bar(Total::Exact(plan.lane_count()), name, |bar| {
@@ -96,16 +97,6 @@ impl Verify {
         } else {
             Err(Error::Verification(format!("results of {} differ from the CPU's", tested.describe())))
         }
-    }
-
-    fn random(&self, profile: &Profile) -> Result<LanePlan> {
-        let lanes_per_model_and_category = self.random_lanes;
-        random_plan(profile, &RandomOptions { seed: self.seed, lanes_per_model_and_category, ..Default::default() })
-    }
-
-    fn thresholds(&self, configured: &Configured, profile: &Profile) -> Result<LanePlan> {
-        let units_per_threshold = configured.settings.verify.threshold_units;
-        threshold_plan(profile, &ThresholdOptions { seed: self.seed, units_per_threshold, ..Default::default() })
     }
 
     fn study(&self, configured: &Configured, profile: &Profile) -> Result<LanePlan> {

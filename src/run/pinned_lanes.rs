@@ -5,7 +5,7 @@ use sha2::{Digest, Sha256};
 use super::sampling::{SampleSource, generator_of};
 use super::study::plan_file::{BlockHead, StudyHead, stripped};
 use crate::engine::ENGINE_VERSION;
-use crate::engine::verify::{RandomOptions, ThresholdOptions, random_plan, threshold_plan};
+use crate::engine::verify::{SetOptions, random_plan, threshold_plan};
 use crate::engine::{Backend, Constants, CpuBackend, Headway, LanePlan, Outcome, Silent, Start, Wanted, words};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -140,11 +140,9 @@ fn the_bits_of_lanes_are_those_of_the_engine_version() {
     for name in Profile::names() {
         for dt_s in [0.04, 0.1] {
             let profile = Profile::load(name).unwrap().with_dt(dt_s).unwrap();
-            let random =
-                RandomOptions { lanes_per_model_and_category: 80, models: models(), ..RandomOptions::default() };
+            let random = SetOptions { size: 80, models: models(), ..SetOptions::default() };
             count += lanes(&mut digests, &random_plan(&profile, &random).unwrap());
-            let thresholds =
-                ThresholdOptions { units_per_threshold: 1, models: models(), ..ThresholdOptions::default() };
+            let thresholds = SetOptions { size: 1, models: models(), ..SetOptions::default() };
             count += lanes(&mut digests, &threshold_plan(&profile, &thresholds).unwrap());
             count += lanes(&mut digests, &study(&profile));
             if name != "jrc-2021" {
