@@ -93,6 +93,8 @@ fn long_scenarios(path: &Path) {
     (scenario["target"]["v"], scenario["target"]["y"]) = (speeds.into(), lateral.into());
     let line = |k: i32| {
         scenario["id"] = format!("long-{k}").into();
+        // Equal scenarios would count once.
+        scenario["ego"]["v0"] = (28.0 + 0.1 * f64::from(k)).into();
         format!("{scenario}\n")
     };
     std::fs::write(path, (0..10).map(line).collect::<String>()).unwrap();
