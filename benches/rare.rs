@@ -9,6 +9,10 @@
 //!
 //! LANESWEEP_HALF_WIDTH (0.1) and LANESWEEP_CRUDE (1e8, draws of the density) change what is asked for.
 
+#[allow(dead_code)] // some of it is for tests only
+#[path = "../tests/common/reliability.rs"]
+mod reliability;
+
 use std::ops::Range;
 use std::path::Path;
 use std::time::Instant;
@@ -20,8 +24,9 @@ use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{LaneLimitState, Question, SampleHeadways, truncated};
 use lanesweep::stats::density::{DensityModel, Mixture, read_density};
-use lanesweep::stats::estimate::{AdaptiveRun, Density, Goal, LimitState, Search, StandardNormal, adaptive};
+use lanesweep::stats::estimate::{Density, Estimate, Goal, LimitState, Search, SearchRun};
 use lanesweep::stats::random::Stream;
+use reliability::{StandardNormal, adaptive};
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/rare-failures");
 /// The first seed of repeats, and of truths.
@@ -105,7 +110,7 @@ fn setting(name: &str, default: f64) -> f64 {
     std::env::var(name).map_or(default, |text| text.parse().expect("a number"))
 }
 
-fn estimate(density: &dyn Density, limit_state: &dyn LimitState, seed: u64) -> AdaptiveRun {
+fn estimate(density: &dyn Density, limit_state: &dyn LimitState, seed: u64) -> (Vec<Estimate>, SearchRun) {
     let crude = setting("LANESWEEP_CRUDE", 1e8) as u64;
     let half_width = setting("LANESWEEP_HALF_WIDTH", 0.1);
     let goal = Goal { half_width, max_draws: 10_000_000, max_crude: crude };
@@ -118,8 +123,8 @@ fn repeats(case: &Case, seeds: Range<u64>) {
     let (mut held, mut errors, mut runs) = (0, Vec::new(), Vec::new());
     for seed in seeds {
         let started = Instant::now();
-        let run = case.with(|density, limit_state| estimate(density, limit_state, seed));
-        let estimate = &run.estimates[0];
+        let (estimates, search) = case.with(|density, limit_state| estimate(density, limit_state, seed));
+        let estimate = &estimates[0];
         let interval = estimate.interval;
         held += u64::from(interval.holds(truth));
         errors.push((estimate.probability / truth - 1.0).abs());
@@ -131,7 +136,7 @@ fn repeats(case: &Case, seeds: Range<u64>) {
             interval.low,
             interval.high,
             estimate.runs,
-            run.search.rounds.len(),
+            search.rounds.len(),
             estimate.weights.map_or(0.0, |weights| weights.effective_failures),
             estimate.weights.map_or(0.0, |weights| weights.crude_fraction),
             estimate.trust.draws(),
@@ -153,7 +158,7 @@ fn repeats(case: &Case, seeds: Range<u64>) {
 /// The mean of unbiased estimates, and its error from their scatter.
 fn truth(case: &Case, seeds: Range<u64>) {
     let n = (seeds.end - seeds.start) as f64;
-    let of = |seed| case.with(|density, limit_state| estimate(density, limit_state, seed)).estimates[0].probability;
+    let of = |seed| case.with(|density, limit_state| estimate(density, limit_state, seed)).0[0].probability;
     let all: Vec<f64> = seeds.map(of).collect();
     let mean = all.iter().sum::<f64>() / n;
     let variance = all.iter().map(|p| (p - mean) * (p - mean)).sum::<f64>() / (n - 1.0);

@@ -349,7 +349,6 @@ def check(
     nominal: bool = False,
     sheet: Path | None = None,
     rows: Path | None = None,
-    series: Path | None = None,
     backend: Literal["auto", "cpu", "gpu"] | None = None,
     device: str | Int | None = None,
     date: str | None = None,
@@ -380,8 +379,6 @@ def check(
         Also write the case sheet as an HTML page.
     rows : path
         Also write a table's answers, one row per case: .csv, .jsonl or .parquet.
-    series : path
-        Also write every step of every model under the first profile, as CSV.
     backend : {"auto", "cpu", "gpu"}
         Of `nominal`. ``"auto"``: a GPU if there is one.
     device : str or int

@@ -36,3 +36,8 @@ fn philox4x32_10(counter: vec4<u32>, key: vec2<u32>) -> vec4<u32> {
 fn stream_words(seed: vec2<u32>, purpose: u32, index: vec2<u32>, block: u32) -> vec4<u32> {
     return philox4x32_10(vec4<u32>(index.x, index.y, block, purpose), seed);
 }
+
+// One of 0 … count - 1; 0 if `count` is 0.
+fn choose(word: u32, count: u32) -> u32 {
+    return wide_product(word, count).x;
+}

@@ -1,4 +1,4 @@
-// Sample index → point: twin of src/engine/generated/points.rs. `numbers` holds means and factors as bits.
+// Sample index → point: twin of src/engine/generated/points.rs. `numbers` holds means and deviations as bits.
 
 // Blocks of four words per draw.
 const BLOCKS: u32 = 4u;
@@ -9,8 +9,6 @@ const SOURCE_GIVEN: u32 = 2u;
 
 // SOURCE_…
 override points_source: u32;
-// Components have weights.
-override points_weighted: bool;
 
 struct Drawn {
     values: array<f32, MAX_PARAMETERS>,
@@ -37,7 +35,7 @@ fn draw_point(index: vec2<u32>) -> Drawn {
     return drawn;
 }
 
-// Draw `attempt` of an index, valid or not. Words 0 and 1 select the component; the others give normal deviates.
+// Draw `attempt` of an index, valid or not. Word 0 selects the component, word 1 is unused, the others give normal deviates.
 fn candidate(index: vec2<u32>, attempt: u32) -> Drawn {
     let d = recipe_dimensions;
     var words: array<u32, 16>;
@@ -63,23 +61,11 @@ fn candidate(index: vec2<u32>, attempt: u32) -> Drawn {
             words[dimension] = sobol_word(dimension, index.x);
         }
     }
-    var component = choose(words[0], generation.components);
-    if points_weighted {
-        component = alias_pick(0u, generation.components, words[0], words[1]);
-    }
-    let factor = generation.first_factor + numbers[generation.first_factor_of + component] * d * d;
+    let component = choose(words[0], generation.components);
     let mean = generation.first_mean + component * d;
-    var deviates: array<f32, MAX_PARAMETERS>;
-    for (var j = 0u; j < recipe_dimensions; j++) {
-        deviates[j] = standard_normal(words[2u + j]);
-    }
     var values: array<f32, MAX_PARAMETERS>;
     for (var j = 0u; j < recipe_dimensions; j++) {
-        var value = number(mean + j);
-        for (var k = 0u; k <= j; k++) {
-            value = value + number(factor + j * d + k) * deviates[k];
-        }
-        values[j] = value;
+        values[j] = number(mean + j) + number(generation.first_deviation + j) * standard_normal(words[2u + j]);
     }
     return Drawn(values, attempt + 1u, component);
 }

@@ -15,7 +15,6 @@ use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::report::case_identity::CaseIdentity;
 use crate::report::case_sheet::CaseSheet;
-use crate::report::trace;
 use crate::run::check::{Check as Checked, Subject};
 use crate::scenario::{Category, Scenario};
 use crate::support::files::{check_output, write_atomically};
@@ -74,9 +73,6 @@ pub(super) struct Check {
     /// No perturbation, clause or boundary is examined, so that no answer is robust.
     #[arg(long, help_heading = "Models and criteria")]
     nominal: bool,
-    /// Also write every step of every model under the first profile
-    #[arg(long, value_name = "FILE.csv", help_heading = "Output", hide_short_help = true)]
-    series: Option<PathBuf>,
     /// Date of the run, as the sheet is to show it; the clock is not asked
     #[arg(long, value_name = "TEXT", help_heading = "Output", hide_short_help = true)]
     date: Option<String>,
@@ -90,7 +86,7 @@ pub(super) struct Check {
 }
 
 from_arguments!(
-    Check { file, row, scenario, profiles, sheet, rows, nominal, series, date, author }
+    Check { file, row, scenario, profiles, sheet, rows, nominal, date, author }
     groups { case, plausibility, format }
 );
 
@@ -157,10 +153,6 @@ impl Check {
         if let Some(path) = &self.sheet {
             write_atomically(path, sheet.html().as_bytes())?;
         }
-        if let Some(path) = &self.series {
-            let named = judgements[0].models.iter().map(|judged| (judged.trace.model.name().to_owned(), &judged.trace));
-            write_atomically(path, trace::table(&named.collect::<Vec<_>>()).csv().as_bytes())?;
-        }
         // If input was skipped the answer is incomplete.
         let exit = if request.incomplete { Exit::Incomplete } else { Exit::from(judgements[0].verdict()) };
         self.format.output(exit, || sheet.text(), || sheet.json())
@@ -176,12 +168,8 @@ impl Check {
 
     /// Refuses flags of one case for a whole table, and flags of a table for one case.
     fn guard_flags(&self, table: Option<&Path>) -> Result<()> {
-        let of_one = [
-            ("--sheet", self.sheet.is_some()),
-            ("--series", self.series.is_some()),
-            ("--date", self.date.is_some()),
-            ("--author", self.author.is_some()),
-        ];
+        let of_one =
+            [("--sheet", self.sheet.is_some()), ("--date", self.date.is_some()), ("--author", self.author.is_some())];
         let of_tables = [("--rows", self.rows.is_some()), ("--nominal", self.nominal)];
         let given =
             |flags: &[(&'static str, bool)]| flags.iter().find(|(_, is_given)| *is_given).map(|(flag, _)| *flag);
@@ -278,16 +266,12 @@ impl Check {
             TableFormat::of(path, &TableFormat::EVERY, "--rows")?;
             check_output(path)?;
         }
-        let outputs = [(&self.sheet, "html", "--sheet"), (&self.series, "csv", "--series")];
-        for (path, ending, flag) in outputs {
-            let Some(path) = path else { continue };
-            if path.extension().is_none_or(|found| !found.eq_ignore_ascii_case(ending)) {
-                let problem = format!("{} does not end in .{ending}", path.display());
-                return Err(Error::usage(Place::item(flag), problem, format!("give a name that ends in .{ending}")));
-            }
-            check_output(path)?;
+        let Some(path) = &self.sheet else { return Ok(()) };
+        if path.extension().is_none_or(|found| !found.eq_ignore_ascii_case("html")) {
+            let problem = format!("{} does not end in .html", path.display());
+            return Err(Error::usage(Place::item("--sheet"), problem, "give a name that ends in .html"));
         }
-        Ok(())
+        check_output(path)
     }
 }
 

@@ -278,8 +278,18 @@ pub(super) fn warn<'a>(errors: impl IntoIterator<Item = &'a Error>) {
     errors.into_iter().for_each(|error| tracing::warn!("{error}; {}", error.help().unwrap_or_default()));
 }
 
-/// A character without a meaning, of the width of a hyphen.
-const HYPHEN: &str = "\u{e000}";
+/// First character of Unicode's private use, where no line is broken.
+const WHOLE: u32 = 0xf0000;
+
+/// Text that is not broken at hyphens, nor anywhere in a line that is a command.
+fn unbroken(text: &str) -> String {
+    let of_line = |line: &'_ str| {
+        let is_command = line.starts_with("lanesweep ");
+        let moved = |c: char| char::from_u32(WHOLE + c as u32).unwrap_or(c);
+        line.chars().map(|c| if c == '-' || is_command && c != '\n' { moved(c) } else { c }).collect::<String>()
+    };
+    text.split_inclusive('\n').map(of_line).collect()
+}
 
 /// Prints an error with its help on stderr.
 pub(super) fn complain(error: &Error) {
@@ -288,14 +298,13 @@ pub(super) fn complain(error: &Error) {
         capture(Level::ERROR, &format!("{error}; {}", error.help().unwrap_or_default()));
         return;
     }
-    let help = error.help().map(|help| shown(&with_flags(&help)).into_owned());
-    // A word is not cut at a hyphen: it may be one of a command.
-    let whole = |text: &str| text.replace('-', HYPHEN);
-    let text = whole(&shown(&with_flags(&error.to_string())));
-    let report = miette::Report::new(Diagnostic { text, help: help.as_deref().map(whole) });
-    let mut stderr = io::stderr().lock();
+    let part = |text: &str| unbroken(&shown(&with_flags(text)));
+    let _ = miette::set_hook(Box::new(|_| Box::new(miette::MietteHandlerOpts::new().break_words(false).build())));
+    let report = Diagnostic { text: part(&error.to_string()), help: error.help().map(|help| part(&help)) };
+    let back = |c: char| (c as u32).checked_sub(WHOLE).and_then(char::from_u32).unwrap_or(c);
+    let report: String = format!("{:?}", miette::Report::new(report)).chars().map(back).collect();
     // Ignore a closed stderr: no message can be shown.
-    let _ = writeln!(stderr, "{}", format!("{report:?}").replace(HYPHEN, "-"));
+    let _ = writeln!(io::stderr().lock(), "{report}");
 }
 
 /// Reports an error of the command line, or prints the requested help.

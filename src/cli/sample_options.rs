@@ -9,7 +9,7 @@ use crate::model::driver::ModelId;
 use crate::report::lanes::table_format;
 use crate::run::sampling::{Estimator, SampleHeadways, SampleOptions, SampleSource, read_proposal};
 use crate::stats::density::{DensityModel, Mixture};
-use crate::stats::estimate::{BinomialInterval, Checkpoints, Goal, Search, StopRule};
+use crate::stats::estimate::{BinomialInterval, Goal, Search, StopRule};
 use crate::support::input_file::canonical;
 use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
@@ -28,7 +28,6 @@ impl Sample {
                 _ => self.settings.half_width,
             },
             time_limit: self.settings.time_limit_s.map(Duration::from_secs_f64),
-            checkpoints: Checkpoints::Doubling,
         }
     }
 

@@ -64,6 +64,12 @@ impl Tracks {
         // Before the work, so that what cannot be written is told at once.
         let open = |to: &PathBuf, record| RunFolder::open(to, record);
         let figures = self.out.as_ref().map(|out| open(out, "tracks.json")).transpose()?;
+        if let (Some(figures), Some(to)) = (&figures, &self.convert)
+            && to.canonicalize().is_ok_and(|to| figures.dir().canonicalize().is_ok_and(|out| out == to))
+        {
+            let problem = format!("{} is the folder of --out too", to.display());
+            return Err(Error::usage(Place::item("--convert"), problem, "give each a folder of its own"));
+        }
         let (table, highd) = match &self.convert {
             Some(to) if to.extension().is_none() => (None, Some(open(to, CONVERTED)?)),
             to => (to.as_ref(), None),

@@ -227,7 +227,7 @@ mod tests {
     use crate::engine::frame::Simulation;
     use crate::engine::lane::{Silent, run_lane};
     use crate::engine::scene::{Scene, fastest_in, may_cross};
-    use crate::engine::verify::{RandomOptions, random_plan};
+    use crate::engine::verify::{SetOptions, random_plan};
     use crate::engine::{Backend, CpuBackend, Executor, LaneCase, Session, SweepSummary, Wanted};
     use crate::model::driver::{DriverModel, DriverState, Hazard, ModelId, View};
     use crate::model::profile::Profile;
@@ -382,12 +382,7 @@ mod tests {
     /// Sweeps random lanes of a category whose steps are skipped because of a false promise, and the same lanes with
     /// every step.
     fn swept<M: DriverModel<f32> + 'static>(category: Category, id: ModelId, model: M) -> (Error, SweepSummary) {
-        let options = RandomOptions {
-            lanes_per_model_and_category: 20_000,
-            categories: vec![category],
-            models: vec![id],
-            ..Default::default()
-        };
+        let options = SetOptions { size: 20_000, categories: vec![category], models: vec![id], ..Default::default() };
         let plan = random_plan(&Profile::load("paper").unwrap(), &options).unwrap();
         let left_out = Instead { plan: &plan, id, model, every_step: false };
         let recheck = Recheck { plan: &plan, recompute: Box::new(left_out), seed: 157, one_in: 20 };
@@ -424,7 +419,7 @@ mod tests {
     /// The same lanes are selected for any division into chunks; the CPU's own batches pass.
     #[test]
     fn seed_and_lane_alone_choose_what_is_checked() {
-        let options = RandomOptions { lanes_per_model_and_category: 3000, ..Default::default() };
+        let options = SetOptions { size: 3000, ..Default::default() };
         let plan = random_plan(&Profile::load("paper").unwrap(), &options).unwrap();
         let options = RecheckOptions { seed: 7, one_in: 100 };
         let recheck = Recheck::new(&plan, options);

@@ -122,10 +122,8 @@ impl Canonical {
             PointSource::Given => self.word(2),
         }
         self.word(points.dimensions as u64);
-        self.words(points.weights.as_ref().map_or(&[], |weights| weights.table().as_flattened()));
         self.floats(&points.means);
-        self.words(&points.factor_of);
-        self.floats(&points.factors);
+        self.floats(&points.deviations);
         // Words and floats without padding: a device gets the same record.
         self.words(bytemuck::cast_slice(std::slice::from_ref(recipe)));
         self.floats(basis);

@@ -8,7 +8,7 @@ const ROUNDS: usize = 10;
 
 /// Returns the high and the low word of the 64-bit product.
 #[inline]
-pub(super) fn wide_product(a: u32, b: u32) -> [u32; 2] {
+fn wide_product(a: u32, b: u32) -> [u32; 2] {
     let product = u64::from(a) * u64::from(b);
     [(product >> 32) as u32, product as u32]
 }
@@ -47,6 +47,13 @@ impl Stream {
     }
 }
 
+/// One of 0 … `count` − 1; 0 where `count` is 0. The high word of a product: each has probability 1/`count` to within
+/// 2⁻³², which is a relative bias of at most `count`/2³².
+#[inline]
+pub fn choose(word: u32, count: u32) -> u32 {
+    wide_product(word, count)[0]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -66,5 +73,18 @@ mod tests {
         for (counter, key, words) in known {
             assert_eq!(philox4x32_10(counter, key), words);
         }
+    }
+
+    #[test]
+    fn choices_are_in_range_and_even() {
+        for count in [1, 2, 3, 7, 1000, u32::MAX] {
+            assert_eq!(choose(0, count), 0);
+            assert_eq!(choose(u32::MAX, count), count - 1);
+        }
+        assert_eq!(choose(u32::MAX, 0), 0);
+        // The words that give k are those in [k·2³²/count, (k + 1)·2³²/count): their number differs by one at most.
+        let mut held = [0; 7];
+        (0..=u32::MAX).step_by(1 << 12).for_each(|word| held[choose(word, 7) as usize] += 1);
+        assert!(held.iter().all(|n| (149_796..=149_797).contains(n)), "{held:?}");
     }
 }

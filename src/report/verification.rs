@@ -2,9 +2,10 @@
 
 use std::fmt::Write;
 
-use crate::engine::verify::{Comparison, GroupComparison, WORDS};
+use crate::engine::verify::{Comparison, DifferingLane, GroupComparison, WORDS};
 use crate::engine::{Outcome, words};
 use crate::model::criterion::Criterion;
+use crate::report::lanes::outcome_json;
 use crate::support::readable::{count, value};
 use crate::support::table::{NumberText, Table};
 
@@ -36,14 +37,11 @@ pub fn comparison(comparison: &Comparison) -> String {
     for lane in &comparison.worst {
         let _ = writeln!(text, "  {} differs in {}", lane.key, lane.names().join(", "));
     }
-    if !comparison.worst.is_empty() {
-        text += "  run one again, word by word: `verify` with its key and the same options\n";
-    }
-    text
+    comparison.worst.first().map_or(text.clone(), |worst| text + &lane(worst))
 }
 
 /// The same as [`comparison`], as JSON.
-pub fn record(comparison: &Comparison) -> serde_json::Value {
+pub fn record(comparison: &Comparison, dt_s: f64) -> serde_json::Value {
     let tallies = Table::of(&comparison.tallies)
         .column("category", |tally| tally.category.key())
         .column("model", |tally| tally.model.name())
@@ -55,7 +53,10 @@ pub fn record(comparison: &Comparison) -> serde_json::Value {
         .column("reference_differing", |tally| tally.reference_differing)
         .columns(Criterion::ALL, |of| format!("{}_failures", of.key()), |tally, of| tally.failed[of.index()])
         .build();
-    let worst = comparison.worst.iter().map(|lane| serde_json::json!({"lane": lane.key, "words": lane.names()}));
+    let worst = comparison.worst.iter().map(|lane| {
+        let [cpu, under_test] = [lane.cpu, lane.tested].map(|outcome| outcome_json(&outcome, dt_s));
+        serde_json::json!({"lane": lane.key, "words": lane.names(), "cpu": cpu, "under_test": under_test})
+    });
     serde_json::json!({
         "set": comparison.set,
         "plan_sha256": comparison.plan_sha256,
@@ -66,16 +67,17 @@ pub fn record(comparison: &Comparison) -> serde_json::Value {
     })
 }
 
-/// The outcome words of one lane on each backend, side by side.
-pub fn lane(key: &str, names: [&str; 3], outcomes: &[Outcome<f64>; 3]) -> String {
-    let all = outcomes.map(|o| words(&o));
-    let shown = outcomes.map(|o| shown(&o));
+/// The words of a lane on the CPU and on the device.
+fn lane(lane: &DifferingLane) -> String {
+    let outcomes = [lane.cpu, lane.tested];
+    let (all, shown) = (outcomes.map(|o| words(&o)), outcomes.map(|o| shown(&o)));
     let word = |at: usize, k: usize| {
-        let mark = if k < 2 || all[2][at] == all[1][at] { "" } else { "  ≠" };
+        let mark = if k == 0 || all[0][at] == all[1][at] { "" } else { "  ≠" };
         NumberText(format!("{}{mark}", shown[k][at]))
     };
-    let rows = Table::of(0..WORDS.len()).column("word", |at| WORDS[at]).columns(0..3, |k| names[k].to_owned(), word);
-    format!("{key}\n{}", rows.build().text())
+    let names = ["CPU, f32", "under test"];
+    let rows = Table::of(0..WORDS.len()).column("word", |at| WORDS[at]).columns(0..2, |k| names[k].to_owned(), word);
+    format!("{}\n{}", lane.key, rows.build().text())
 }
 
 /// The words for people. Numbers have all digits, because a difference may be in the last one.

@@ -2,7 +2,7 @@
 #![allow(dead_code)] // every test binary uses its own part
 
 use super::mined::scenarios_of;
-use lanesweep::engine::verify::{RandomOptions, ThresholdOptions, random_plan, threshold_plan};
+use lanesweep::engine::verify::{SetOptions, random_plan, threshold_plan};
 use lanesweep::engine::{Constants, LaneCase, LanePlan, Observer, Outcome, Start};
 use lanesweep::model::criterion::{BtnContact, BtnForm, LateralGate};
 use lanesweep::model::driver::ModelId;
@@ -79,12 +79,12 @@ pub fn run_case<R: Real>(
 
 /// Random lanes of each model and category.
 pub fn random(profile: &Profile, lanes: u64) -> LanePlan {
-    random_plan(profile, &RandomOptions { lanes_per_model_and_category: lanes, ..Default::default() }).unwrap()
+    random_plan(profile, &SetOptions { size: lanes, ..Default::default() }).unwrap()
 }
 
 /// Lanes on thresholds: so many units of each threshold and category.
 pub fn thresholds(profile: &Profile, units: u64) -> LanePlan {
-    threshold_plan(profile, &ThresholdOptions { units_per_threshold: units, ..Default::default() }).unwrap()
+    threshold_plan(profile, &SetOptions { size: units, ..Default::default() }).unwrap()
 }
 
 /// A study of two synthetic recordings.

@@ -1,8 +1,11 @@
 //! Problems of structural reliability whose probabilities are known.
 
 use lanesweep::Result;
-use lanesweep::stats::density::Mixture;
-use lanesweep::stats::estimate::LimitState;
+use lanesweep::stats::density::{Mixture, normal_quantile};
+use lanesweep::stats::estimate::{
+    Density, Estimate, Goal, Importance, LimitState, Search, SearchRun, from_weight_sums, importance_sums, search,
+};
+use lanesweep::stats::random::Stream;
 
 /// Φ(−β).
 pub fn tail(beta: f64) -> f64 {
@@ -50,4 +53,57 @@ pub fn four_branch_probability(near: f64, far: f64) -> f64 {
 /// Independent standard normal parameters as a mixture of one: chains walk it as they walk any density.
 pub fn unit_mixture(dimensions: usize) -> Mixture {
     Mixture::of_kernels(vec![vec![0.0; dimensions]], &vec![1.0; dimensions]).expect("well formed")
+}
+
+/// Independent standard normal parameters, drawn without choosing a kernel.
+pub struct StandardNormal {
+    pub dimensions: usize,
+}
+
+impl Density for StandardNormal {
+    fn dimensions(&self) -> usize {
+        self.dimensions
+    }
+
+    fn log_density(&self, point: &[f64]) -> f64 {
+        let square: f64 = point.iter().map(|x| x * x).sum();
+        -0.5 * (square + self.dimensions as f64 * libm::log(2.0 * std::f64::consts::PI))
+    }
+
+    fn attempt(&self, stream: &Stream, index: u64, attempt: u32) -> Vec<f64> {
+        let blocks = self.dimensions.div_ceil(4) as u32;
+        let words = (0..blocks).flat_map(|block| stream.words(index, attempt.wrapping_mul(blocks) + block));
+        words.take(self.dimensions).map(|word| normal_quantile((f64::from(word) + 0.5) / 2_f64.powi(32))).collect()
+    }
+
+    fn mixture(&self) -> Option<Mixture> {
+        Some(unit_mixture(self.dimensions))
+    }
+}
+
+/// Importance sampling beside draws of the density, question by question.
+pub fn importance(
+    nominal: &dyn Density,
+    proposal: &Mixture,
+    limit_state: &dyn LimitState,
+    options: &Importance,
+    level: f64,
+) -> Result<Vec<Estimate>> {
+    let sums = importance_sums(nominal, proposal, limit_state, options, 0..options.draws)?;
+    Ok(sums.iter().map(|sums| from_weight_sums(&sums.total().unwrap_or_default(), level)).collect())
+}
+
+/// As `sample --estimator is` does: a search for a proposal, then draws of it. Their number is fixed before the first.
+pub fn adaptive(
+    nominal: &dyn Density,
+    limit_state: &dyn LimitState,
+    options: &Search,
+    goal: &Goal,
+    seed: u64,
+    level: f64,
+) -> Result<(Vec<Estimate>, SearchRun)> {
+    let run = search(nominal, limit_state, options, seed)?;
+    let draws = goal.draws(&run.questions, seed, level);
+    let estimates = importance(nominal, &run.proposal_or(nominal)?, limit_state, &draws, level)?;
+    Ok((estimates.into_iter().map(|estimate| estimate.after_search(run.points)).collect(), run))
 }

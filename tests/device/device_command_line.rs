@@ -63,16 +63,6 @@ fn verify_passes_on_the_software_device_and_says_what_it_compared() {
 }
 
 #[test]
-fn a_lane_can_be_run_again_from_its_key() {
-    let Some(device) = device() else { return };
-    let key = "random-cut-out-seed157-0000003/mixed/12m/FSM";
-    let verify = format!("verify --device {device} --random-lanes 400 --lane");
-    let text = ran(Path::new("."), &format!("{verify} {key}"));
-    assert!(text.contains(key) && text.contains("min_ttc") && text.contains("f64 reference"), "{text}");
-    refused(Path::new("."), &format!("{verify} random-nothing"), 2, "no lane `random-nothing`");
-}
-
-#[test]
 fn the_cpu_backend_can_be_verified_without_any_device() {
     let verify = "-q verify --backend cpu --random-lanes 400 --config verify.threshold_units=1";
     assert!(ran(Path::new("."), &format!("{verify} {SMALL}")).contains("Under test: CPU"));

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::common::device::{open, out_of_memory_at, tampered};
 use lanesweep::engine::gpu::{GpuBackend, GpuOptions};
-use lanesweep::engine::verify::{RandomOptions, random_plan};
+use lanesweep::engine::verify::{SetOptions, random_plan};
 use lanesweep::engine::{Backend, Block, CaseSource, CpuBackend, Headway, LaneCase, LanePlan, Wanted, same_words};
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
@@ -14,8 +14,7 @@ use lanesweep::scenario::Tables;
 const ALL_WANTED: [Wanted; 2] = [Wanted::Verdicts, Wanted::Outcomes];
 
 fn random(lanes: u64, seed: u64, models: &[ModelId]) -> LanePlan {
-    let options =
-        RandomOptions { lanes_per_model_and_category: lanes, seed, models: models.to_vec(), ..Default::default() };
+    let options = SetOptions { size: lanes, seed, models: models.to_vec(), ..Default::default() };
     random_plan(&Profile::load("paper").unwrap(), &options).unwrap()
 }
 

@@ -6,14 +6,14 @@ use std::time::Duration;
 use crate::common::device::{lost_at, open, out_of_memory_at, patched, tampered};
 use lanesweep::Error;
 use lanesweep::engine::gpu::{GpuBackend, GpuOptions};
-use lanesweep::engine::verify::{RandomOptions, random_plan};
+use lanesweep::engine::verify::{SetOptions, random_plan};
 use lanesweep::engine::{
     Backend, CpuBackend, Executor, LanePlan, Partial, RecheckOptions, SweepSummary, Verdicts, Wanted,
 };
 use lanesweep::model::profile::Profile;
 
 fn plan() -> LanePlan {
-    let options = RandomOptions { lanes_per_model_and_category: 40_000, ..Default::default() };
+    let options = SetOptions { size: 40_000, ..Default::default() };
     random_plan(&Profile::load("paper").unwrap(), &options).unwrap()
 }
 
@@ -102,7 +102,7 @@ fn lanes_of_more_steps_than_a_device_runs_are_computed_all_the_same() {
     let profile = Profile::load("jrc-2021").unwrap();
     let mut long = profile.with_dt(0.001).unwrap();
     long.frame.time_cap_s = 120.0;
-    let options = RandomOptions { lanes_per_model_and_category: 40, ..Default::default() };
+    let options = SetOptions { size: 40, ..Default::default() };
     let plan = random_plan(&long, &options).unwrap();
     let Some(gpu) = open(GpuOptions::default()) else { return };
     let (verdicts, summary) = swept(&plan, &gpu);

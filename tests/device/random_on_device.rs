@@ -1,21 +1,19 @@
-//! What `src/random` makes of (seed, index), `shaders/shared/{philox,uniform,normal,sobol}.wgsl` make bit for bit: on
+//! What `src/random` makes of (seed, index), `shaders/shared/{philox,normal,sobol}.wgsl` make bit for bit: on
 //! the software Vulkan, for a million indices in eight dimensions, and for the words at which the table of normal
 //! deviates goes from one cubic to the next.
 
 use crate::kernel::{Kernel, Path, WORKGROUP};
 use lanesweep::engine::gpu::shader::RANDOM;
-use lanesweep::stats::random::{AliasTable, Sobol, Stream, choose, normal_table, standard_normal, unit_uniform};
+use lanesweep::stats::random::{Sobol, Stream, choose, normal_table, standard_normal};
 
 const BINDINGS: &str = "
 @group(0) @binding(0) var<storage, read_write> answers: array<u32>;
 @group(0) @binding(1) var<storage, read> questions: array<u32>;
 @group(0) @binding(2) var<storage, read> normal_table: array<vec4<f32>>;
 @group(0) @binding(3) var<storage, read> sobol_table: array<u32>;
-@group(0) @binding(4) var<storage, read> alias_table: array<vec2<u32>>;
 ";
 
-/// Per index and dimension: the words of both generators, the normal deviate of each, a uniform number, a choice, and a
-/// pick from the second of two tables.
+/// Per index and dimension: the words of both generators, the normal deviate of each, and a choice.
 const OF_INDICES: &str = "
 @compute @workgroup_size(64)
 fn lanes(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -26,19 +24,16 @@ fn lanes(@builtin(global_invocation_id) id: vec3<u32>) {
         let four = stream_words(seed, questions[2], index, dimension / 4u);
         let random = four[dimension % 4u];
         let spread = sobol_word(dimension, low);
-        let at = (id.x * 8u + dimension) * 7u;
+        let at = (id.x * 8u + dimension) * 5u;
         answers[at] = random;
         answers[at + 1u] = spread;
         answers[at + 2u] = bitcast<u32>(standard_normal(random));
         answers[at + 3u] = bitcast<u32>(standard_normal(spread));
-        answers[at + 4u] = bitcast<u32>(unit_uniform(spread));
-        answers[at + 5u] = choose(random, questions[5] + dimension);
-        answers[at + 6u] = alias_pick(questions[6], questions[7], random, spread);
+        answers[at + 4u] = choose(random, questions[5] + dimension);
     }
 }
 ";
-const ANSWERS: [&str; 7] =
-    ["Philox word", "Sobol word", "normal of it", "normal of the Sobol word", "uniform number", "choice", "pick"];
+const ANSWERS: [&str; 5] = ["Philox word", "Sobol word", "normal of it", "normal of the Sobol word", "choice"];
 
 /// Per word: its normal deviate.
 const OF_WORDS: &str = "
@@ -60,31 +55,25 @@ fn source(kernel: &str) -> String {
 /// The tables of a seed, as words.
 struct Tables {
     sobol: Sobol,
-    first: AliasTable,
-    second: AliasTable,
-    words: [Vec<u32>; 3],
+    words: [Vec<u32>; 2],
 }
 
 impl Tables {
     fn new(seed: u64) -> Tables {
         let sobol = Sobol::new(seed, DIMENSIONS).unwrap();
-        let first = AliasTable::new(&[1.0, 2.0, 3.0]).unwrap();
-        let weights: Vec<f64> = (0..777).map(|k| f64::from(k % 13) * 0.1 + f64::from(k) / 777.0).collect();
-        let second = AliasTable::new(&weights).unwrap();
         let normal = normal_table().iter().flatten().map(|c| c.to_bits()).collect();
-        let both = first.table().iter().chain(second.table()).flatten().copied().collect();
-        let words = [normal, sobol.table().iter().flatten().copied().collect(), both];
-        Tables { sobol, first, second, words }
+        let words = [normal, sobol.table().iter().flatten().copied().collect()];
+        Tables { sobol, words }
     }
 
     fn run(&self, kernel: &Kernel, questions: &[u32], workgroups: u32, words: usize) -> Vec<u32> {
-        let [normal, sobol, alias] = &self.words;
-        kernel.run(&[questions, normal, sobol, alias], workgroups, words)
+        let [normal, sobol] = &self.words;
+        kernel.run(&[questions, normal, sobol], workgroups, words)
     }
 }
 
 /// What Rust says to an index and a dimension.
-fn expected(tables: &Tables, stream: Stream, index: u64, dimension: u32) -> [u32; 7] {
+fn expected(tables: &Tables, stream: Stream, index: u64, dimension: u32) -> [u32; 5] {
     let random = stream.words(index, dimension / 4)[(dimension % 4) as usize];
     let spread = tables.sobol.word(index & 0xffff_ffff, dimension).unwrap();
     [
@@ -92,9 +81,7 @@ fn expected(tables: &Tables, stream: Stream, index: u64, dimension: u32) -> [u32
         spread,
         standard_normal(random).to_bits(),
         standard_normal(spread).to_bits(),
-        unit_uniform(spread).to_bits(),
         choose(random, CHOICES + dimension),
-        tables.second.pick(random, spread),
     ]
 }
 
@@ -103,14 +90,14 @@ const CHOICES: u32 = 3;
 const SEED: u64 = 0xFEDC_BA98_7654_3210;
 
 /// Differing words by kind, with the first of them.
-fn differing(kernel: &Kernel, first_indices: &[u64]) -> ([usize; 7], Option<String>) {
+fn differing(kernel: &Kernel, first_indices: &[u64]) -> ([usize; 5], Option<String>) {
     let tables = Tables::new(SEED);
     let stream = Stream { seed: SEED, purpose: 7 };
-    let (mut wrong, mut first) = ([0; 7], None);
+    let (mut wrong, mut first) = ([0; 5], None);
     for &start in first_indices {
         let questions = [
             [SEED as u32, (SEED >> 32) as u32, stream.purpose, start as u32, (start >> 32) as u32],
-            [CHOICES, tables.first.count(), tables.second.count(), 0, 0],
+            [CHOICES, 0, 0, 0, 0],
         ]
         .concat();
         let words = (BATCH * DIMENSIONS) as usize * ANSWERS.len();
@@ -145,26 +132,26 @@ fn a_million() -> Vec<u64> {
 
 #[test]
 fn a_million_indices_in_eight_dimensions_have_the_bits_of_rust() {
-    let Some(kernel) = Kernel::new(&source(OF_INDICES), 4, Path::Exact) else { return };
+    let Some(kernel) = Kernel::new(&source(OF_INDICES), 3, Path::Exact) else { return };
     let indices = a_million();
     assert!(indices.len() * BATCH as usize >= 1_000_000);
     let (wrong, first) = differing(&kernel, &indices);
     println!("{} indices, {DIMENSIONS} dimensions: {wrong:?} words differ", indices.len() * BATCH as usize);
-    assert_eq!(wrong, [0; 7], "{first:?}");
+    assert_eq!(wrong, [0; 5], "{first:?}");
 }
 
 #[test]
 fn as_plain_wgsl_the_words_are_the_same_and_deviates_at_most_rounded_apart() {
-    let Some(kernel) = Kernel::new(&source(OF_INDICES), 4, Path::Plain) else { return };
+    let Some(kernel) = Kernel::new(&source(OF_INDICES), 3, Path::Plain) else { return };
     let (wrong, first) = differing(&kernel, &[0]);
     println!("as plain WGSL {wrong:?} words of {} differ", BATCH * DIMENSIONS);
     // Sums and products of integers leave nothing open; those of floats may be contracted.
-    assert_eq!([wrong[0], wrong[1], wrong[4], wrong[5], wrong[6]], [0; 5], "{first:?}");
+    assert_eq!([wrong[0], wrong[1], wrong[4]], [0; 3], "{first:?}");
 }
 
 #[test]
 fn the_ends_of_every_cubic_have_the_bits_of_rust() {
-    let Some(kernel) = Kernel::new(&source(OF_WORDS), 4, Path::Exact) else { return };
+    let Some(kernel) = Kernel::new(&source(OF_WORDS), 3, Path::Exact) else { return };
     let mut words: Vec<u32> = vec![];
     for octave in 0..32_u32 {
         for step in 0..16_u64 {
@@ -192,13 +179,11 @@ fn a_defect_of_a_fragment_is_seen() {
         // The order of the sums. (A contraction would not show here: Mesa's software Vulkan rounds `fma` twice. That
         // none is allowed stands in src/engine/gpu/spirv.rs.)
         ("((c.w * x + c.z) * x + c.y) * x + c.x", "(c.w * x + c.z) * (x * x) + (c.y * x + c.x)", 2),
-        ("2u * (word >> 9u) + 1u", "2u * (word >> 9u)", 4),
-        ("word_b < entry.x", "word_b > entry.x", 6),
     ] {
         let source = source(OF_INDICES);
         assert_eq!(source.matches(right).count(), 1, "{right}");
         let broken = source.replace(right, wrong);
-        let Some(kernel) = Kernel::new(&broken, 4, Path::Exact) else { return };
+        let Some(kernel) = Kernel::new(&broken, 3, Path::Exact) else { return };
         let (found, _) = differing(&kernel, &[(1 << 32) - 99]);
         assert!(found[kind] > 0, "{right} is {wrong:?}: {found:?}");
     }

@@ -93,8 +93,7 @@ fn generator_records() -> Vec<Record> {
         record!("DrawnRecord", DrawnRecord, { tries: u32, component: u32 }),
         record!("Generation", Generation, {
             index_low: u32, index_high: u32, count: u32, seed_low: u32, seed_high: u32, purpose: u32,
-            components: u32, first_mean: u32, first_factor: u32, first_factor_of: u32,
-            stride: u32,
+            components: u32, first_mean: u32, first_deviation: u32, stride: u32,
         }),
     ]
 }
@@ -113,9 +112,8 @@ fn generator_constants() -> Vec<(&'static str, f64)> {
     let (module, _) = parse(&shader::assemble_generator());
     let names = module.overrides.iter().map(|(_, o)| o.name.clone().unwrap());
     let recipe = Recipe { dimensions: 1, step_cap: 100, inverse_dt: 25.0, ..bytemuck::Zeroable::zeroed() };
-    let (source, dimensions, weights) = (generated::PointSource::Given, 1, None);
-    let (means, factor_of, factors) = (vec![1.0], vec![0], vec![1.0]);
-    let points = generated::Points { source, dimensions, weights, means, factor_of, factors };
+    let (means, deviations) = (vec![1.0], vec![1.0]);
+    let points = generated::Points { source: generated::PointSource::Given, dimensions: 1, means, deviations };
     let generator = generated::Generator { points, recipe, basis: Vec::new() };
     let given = generator.shader_constants();
     assert_eq!(names.collect::<BTreeSet<_>>(), given.iter().map(|(name, _)| (*name).to_owned()).collect());
@@ -419,17 +417,11 @@ fn every_model_has_a_shader_with_the_functions_of_its_rust_file_in_their_order()
 fn the_fragments_of_sampling_have_the_functions_of_their_rust_files_in_their_order() {
     // What makes the tables, which only the host does; and methods that only look up a row and call what has a twin.
     let no_twin = ["normal_table", "inverse_normal_tail", "segment", "new", "table", "word", "directions"];
-    let no_twin = [&no_twin[..], &["count", "columns"]].concat();
     // Methods have the name of their type with them in WGSL.
-    let renamed = [("words", "stream_words"), ("pick", "alias_pick")];
     for (file, shader) in RANDOM {
         let name = Path::new(file).file_name().unwrap().to_str().unwrap();
         let mut names = twin_functions("src/random", name, &no_twin);
-        for name in &mut names {
-            if let Some((_, in_wgsl)) = renamed.iter().find(|(in_rust, _)| in_rust == name) {
-                *name = (*in_wgsl).to_owned();
-            }
-        }
+        names.iter_mut().filter(|name| *name == "words").for_each(|name| *name = "stream_words".to_owned());
         assert_eq!(names, function_names(shader), "{file} and its twin");
     }
 }
@@ -437,8 +429,7 @@ fn the_fragments_of_sampling_have_the_functions_of_their_rust_files_in_their_ord
 #[test]
 fn the_fragments_of_sampling_do_only_what_devices_agree_on() {
     let tables = "@group(0) @binding(0) var<storage, read> normal_table: array<vec4<f32>>;
-        @group(0) @binding(1) var<storage, read> sobol_table: array<u32>;
-        @group(0) @binding(2) var<storage, read> alias_table: array<vec2<u32>>;\n";
+        @group(0) @binding(1) var<storage, read> sobol_table: array<u32>;\n";
     let source = RANDOM.iter().fold(tables.to_owned(), |source, (_, text)| source + text);
     let (module, info) = parse(&source);
     let found = float_operations(&module, &info);

@@ -91,7 +91,7 @@ fn draws_have_the_mean_and_the_spread_of_their_mixture_and_stay_valid() {
     let profile = Profile::load("paper").unwrap();
     let mixture = density.kde.mixture().unwrap();
     for source in [SampleSource::Random, SampleSource::Sobol] {
-        let generator = generator_of(&density.space, &mixture, &density.sizes, &profile, source, 7).unwrap();
+        let generator = generator_of(&density.space, &density.kde, &density.sizes, &profile, source, 7).unwrap();
         let n = 1 << 16;
         let d = mixture.dimensions();
         let (mut sum, mut valid) = (vec![0.0; d], 0.0);

@@ -3,9 +3,7 @@
 use std::collections::{BTreeMap, HashSet};
 use std::ops::Range;
 
-use lanesweep::engine::verify::{
-    RandomOptions, SIDES, Threshold, ThresholdOptions, VARIANTS, random_plan, threshold_plan,
-};
+use lanesweep::engine::verify::{SIDES, SetOptions, Threshold, VARIANTS, random_plan, threshold_plan};
 use lanesweep::engine::{Backend, CpuBackend, EndReason, LaneCase, LanePlan, NO_STEP, Outcome, Wanted};
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
@@ -17,12 +15,12 @@ fn profile(name: &str) -> Profile {
 }
 
 fn random(name: &str, seed: u64, lanes: u64) -> LanePlan {
-    let options = RandomOptions { seed, lanes_per_model_and_category: lanes, ..RandomOptions::default() };
+    let options = SetOptions { seed, size: lanes, ..SetOptions::default() };
     random_plan(&profile(name), &options).unwrap()
 }
 
 fn thresholds(name: &str, seed: u64, units_per_threshold: u64) -> LanePlan {
-    let options = ThresholdOptions { seed, units_per_threshold, ..ThresholdOptions::default() };
+    let options = SetOptions { seed, size: units_per_threshold, ..SetOptions::default() };
     threshold_plan(&profile(name), &options).unwrap()
 }
 
@@ -41,10 +39,10 @@ fn cases(plan: &LanePlan) -> impl Iterator<Item = (usize, u64, usize)> + '_ {
 fn a_unit_is_the_same_whatever_the_size_and_the_categories_asked_for() {
     let (paper, jrc) = (profile("paper"), profile("jrc-2021"));
     let (categories, models) = (vec![Category::Lvd], vec![ModelId::Fsm]);
-    let of_lvd = RandomOptions { seed: 7, lanes_per_model_and_category: 40, categories, models };
+    let of_lvd = SetOptions { seed: 7, size: 40, categories, models };
     let of_lvd = random_plan(&jrc, &of_lvd).unwrap();
     let (categories, models) = (vec![Category::Lvd], vec![ModelId::Fsm]);
-    let on_lvd = ThresholdOptions { seed: 7, units_per_threshold: 1, categories, models };
+    let on_lvd = SetOptions { seed: 7, size: 1, categories, models };
     let on_lvd = threshold_plan(&paper, &on_lvd).unwrap();
     for (few, many, lvd) in [
         (random("jrc-2021", 7, 200), random("jrc-2021", 7, 4000), of_lvd),
@@ -203,13 +201,13 @@ fn every_criterion_fails_and_passes_often_for_every_model_in_every_category() {
 #[test]
 fn empty_sets_and_categories_named_twice_are_refused() {
     let paper = profile("paper");
-    let none = RandomOptions { lanes_per_model_and_category: 0, ..RandomOptions::default() };
+    let none = SetOptions { size: 0, ..SetOptions::default() };
     assert!(random_plan(&paper, &none).is_err());
-    let twice = RandomOptions { categories: vec![Category::Lvd, Category::Lvd], ..RandomOptions::default() };
+    let twice = SetOptions { categories: vec![Category::Lvd, Category::Lvd], ..SetOptions::default() };
     assert!(random_plan(&paper, &twice).err().unwrap().to_string().contains("`LVD` is given twice"));
-    let no_category = ThresholdOptions { categories: vec![], ..ThresholdOptions::default() };
+    let no_category = SetOptions { categories: vec![], ..SetOptions::default() };
     assert!(threshold_plan(&paper, &no_category).is_err());
-    let no_unit = ThresholdOptions { units_per_threshold: 0, ..ThresholdOptions::default() };
+    let no_unit = SetOptions { size: 0, ..SetOptions::default() };
     assert!(threshold_plan(&paper, &no_unit).is_err());
     assert_eq!((VARIANTS[0], SIDES[0]), ("S", "S"));
 }

@@ -302,11 +302,13 @@ fn a_mined_scenario_is_checked_by_its_id() {
 
 /// The table, the figure of the page, the series and the JSON take the time of braking from one place.
 #[test]
-fn the_sheet_and_the_series_go_to_files_with_one_time_of_braking() {
+fn the_sheet_and_the_series_have_one_time_of_braking() {
     let dir = tempfile::tempdir().unwrap();
-    let case = "cut-in 60 40 15 1 --sheet case.html --series case.csv --format json";
-    let sheet: Value = serde_json::from_str(&ran(dir.path(), &arguments(case))).unwrap();
-    let [page, series] = ["case.html", "case.csv"].map(|file| std::fs::read_to_string(dir.path().join(file)).unwrap());
+    let case = arguments("cut-in 60 40 15 1 --sheet case.html --format json");
+    let sheet: Value = serde_json::from_str(&ran(dir.path(), &case)).unwrap();
+    let page = std::fs::read_to_string(dir.path().join("case.html")).unwrap();
+    let simulate = arguments("cut-in 60 40 15 1").replace("check", "simulate --models all");
+    let series = ran(dir.path(), &simulate.replace("--profiles", "--profile"));
     for part in ["the system has to avoid the collision", "TTC at lane intrusion", "<svg", "Initial gap (m)"] {
         assert!(page.contains(part), "{part}");
     }

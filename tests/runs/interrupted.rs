@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use crate::common::program::{self, PATIENCE, kill, names, ran, send, start, wait_for_run, wait_until, words};
 use lanesweep::Error;
 use lanesweep::cli::signals;
-use lanesweep::engine::verify::{RandomOptions, random_plan};
+use lanesweep::engine::verify::{SetOptions, random_plan};
 use lanesweep::engine::{Backend, Chunk, CpuBackend, Executor, LanePlan, Session, Verdicts, Wanted};
 use lanesweep::model::profile::Profile;
 use lanesweep::support::cancel::Cancel;
@@ -93,6 +93,8 @@ fn long_scenarios(path: &Path) {
     (scenario["target"]["v"], scenario["target"]["y"]) = (speeds.into(), lateral.into());
     let line = |k: i32| {
         scenario["id"] = format!("long-{k}").into();
+        // Equal scenarios would count once.
+        scenario["ego"]["v0"] = (28.0 + 0.1 * f64::from(k)).into();
         format!("{scenario}\n")
     };
     std::fs::write(path, (0..10).map(line).collect::<String>()).unwrap();
@@ -205,7 +207,7 @@ fn a_time_limit_and_a_request_are_seen_until_they_are_withdrawn() {
 
 #[test]
 fn a_sweep_whose_owner_cancels_it_ends_after_the_chunk_and_keeps_nothing() {
-    let options = RandomOptions { lanes_per_model_and_category: 200, ..Default::default() };
+    let options = SetOptions { size: 200, ..Default::default() };
     let plan = random_plan(&Profile::load("paper").unwrap(), &options).unwrap();
     let executor = Executor { chunk_lanes: Some(100), ..Executor::new(CpuBackend::lane_arithmetic()) };
     let (cancel, mut chunks) = (executor.cancel.clone(), 0);
@@ -262,7 +264,7 @@ fn the_work_between_two_looks_is_bounded_whatever_the_time_step() {
     ];
     for dt_s in [0.1, 0.04, 0.01, 0.001, 0.0001] {
         let profile = Profile::load("paper").unwrap().with_dt(dt_s).unwrap();
-        let options = RandomOptions { lanes_per_model_and_category: 50, ..Default::default() };
+        let options = SetOptions { size: 50, ..Default::default() };
         let plan = random_plan(&profile, &options).unwrap();
         let steps = u64::from(plan.profile.step_cap());
         for (backend, bound) in &backends {

@@ -71,6 +71,13 @@ fn a_reader_that_goes_away_loses_no_result() {
 }
 
 #[test]
+fn one_folder_is_not_given_two_runs() {
+    let dir = tempfile::tempdir().unwrap();
+    refused(dir.path(), "tracks a.csv --out t --convert ./t", 2, "is the folder of --out too");
+    assert!(!dir.path().join("t").exists());
+}
+
+#[test]
 fn a_foreign_index_of_exported_scenarios_and_a_file_of_their_name_stay() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();

@@ -68,7 +68,12 @@ fn a_folder_that_cannot_give_a_result_says_why_and_what_makes_it() {
     refused(dir, "merge empty", 3, "an unsplit run");
     ran(dir, &format!("{SAMPLE} --out p --shard 0/2"));
     refused(dir, "merge p", 3, "15000 of 30000 units are missing");
-    refused(dir, "merge p", 3, "--plan p/plan.json --shard 1/2 --out p");
+    let long = "name-of-a-folder/".repeat(6) + "run";
+    ran(dir, &format!("{SAMPLE} --out {long} --shard 0/2"));
+    // A command is one line, whatever its length.
+    let (.., said) = lanesweep(dir, &words(&format!("merge {long}")));
+    let command = format!("lanesweep sample --plan {long}/plan.json --shard 1/2 --out {long}");
+    assert!(said.lines().any(|line| line.trim() == command), "{said}");
     ran(dir, &format!("{SAMPLE} --out p --shard 1/2"));
     let part = dir.join("p/part-00001-of-00002.json");
     let whole = std::fs::read(&part).unwrap();

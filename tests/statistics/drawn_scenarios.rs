@@ -41,9 +41,8 @@ fn every_draw_starts_and_ends_in_the_lanes_of_its_category_and_drives_at_a_speed
     for id in Parameterization::ALL.into_iter().filter(|id| id.coefficients().is_some()) {
         for svd_lateral in [SvdLateral::Signed, SvdLateral::Mirrored] {
             let density = density(id, options(svd_lateral));
-            let mixture = density.kde.mixture().unwrap();
             let source = SampleSource::Random;
-            let generator = generator_of(&density.space, &mixture, &density.sizes, &profile, source, 7).unwrap();
+            let generator = generator_of(&density.space, &density.kde, &density.sizes, &profile, source, 7).unwrap();
             for index in 0..2000 {
                 let drawn = generator.draw(index);
                 let point: Vec<f64> =

@@ -8,15 +8,17 @@ use lanesweep::engine::Confusion;
 use lanesweep::run::score::{ScoreOptions, f1, f1_interval};
 use lanesweep::stats::density::{Mixture, normal_quantile};
 use lanesweep::stats::estimate::{
-    BinomialInterval, Clusters, Counts, Density, Estimate, Goal, LimitState, Search, StandardNormal, StopReason,
-    StopRule, Truncated, Verdict, adaptive, cluster_rate, from_counts,
+    BinomialInterval, Clusters, Counts, Density, Estimate, Goal, LimitState, Search, StopReason, StopRule, Truncated,
+    Verdict, cluster_rate, from_counts,
 };
 use lanesweep::stats::random::Stream;
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
 
-use crate::common::reliability::{four_branch, four_branch_probability, linear, tail, unit_mixture};
+use crate::common::reliability::{
+    StandardNormal, adaptive, four_branch, four_branch_probability, linear, tail, unit_mixture,
+};
 
 const REPEATS: u64 = 1000;
 
@@ -186,7 +188,7 @@ fn adaptive_importance_sampling_intervals_hold() {
             let goal = Goal { half_width: 0.2, max_draws: 100_000, max_crude: 200_000 };
             adaptive(&*density, &*limit_state, &Search { crude: 200_000, ..Search::default() }, &goal, seed, 0.95)
                 .expect("an estimate")
-                .estimates
+                .0
                 .remove(0)
         });
         misses.want(row.coverage >= 0.92 && row.median_error <= 0.1, &row, "92 %, and a median error of 10 %");

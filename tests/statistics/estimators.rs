@@ -3,17 +3,19 @@
 
 use lanesweep::stats::density::Mixture;
 use lanesweep::stats::estimate::{
-    AdaptiveRun, BlockSums, Density, Estimate, Goal, Importance, LimitState, Search, StandardNormal, Truncated,
-    Verdict, Warning, WeightSums, adaptive, importance, importance_sums,
+    BlockSums, Density, Estimate, Goal, Importance, LimitState, Search, SearchRun, Truncated, Verdict, Warning,
+    WeightSums, importance_sums,
 };
 
-use crate::common::reliability::{four_branch, four_branch_probability, linear, tail, two_sided, unit_mixture};
+use crate::common::reliability::{
+    StandardNormal, adaptive, four_branch, four_branch_probability, importance, linear, tail, two_sided, unit_mixture,
+};
 
 /// At most so many draws of the density, in the search and again beside the final draws.
 const CRUDE: u64 = 1_000_000;
 
 /// The default search, ± 20 % at 95 %.
-fn found(density: &dyn Density, limit_state: &dyn LimitState, seed: u64) -> AdaptiveRun {
+fn found(density: &dyn Density, limit_state: &dyn LimitState, seed: u64) -> (Vec<Estimate>, SearchRun) {
     let goal = Goal { half_width: 0.2, max_draws: 100_000, max_crude: CRUDE };
     adaptive(density, limit_state, &Search { crude: CRUDE, ..Search::default() }, &goal, seed, 0.95).unwrap()
 }
@@ -85,8 +87,8 @@ fn sums_of_a_proposal_are_the_same_bits_in_any_division_of_the_indices() {
 #[test]
 fn a_search_finds_the_linear_limit_s_probability_in_any_dimension() {
     for (beta, dimensions) in [(2.0, 2), (3.5, 5), (5.0, 10)] {
-        let run = found(&StandardNormal { dimensions }, &linear(beta), 3);
-        let estimate = &run.estimates[0];
+        let (estimates, _) = found(&StandardNormal { dimensions }, &linear(beta), 3);
+        let estimate = &estimates[0];
         assert!((estimate.probability / tail(beta) - 1.0).abs() < 0.15, "{estimate:?}");
         // A million draws of the density do not exclude other failures of a probability below 3.7e-6.
         let is_bounded = tail(beta) > 7.4e-6;
@@ -99,9 +101,9 @@ fn a_search_finds_the_linear_limit_s_probability_in_any_dimension() {
 fn a_search_finds_every_branch() {
     for (near, far) in [(3.0, 3.5), (5.0, 5.2)] {
         let (density, truth) = (StandardNormal { dimensions: 2 }, four_branch_probability(near, far));
-        let run = found(&density, &four_branch(near, far), 1);
-        assert!((run.estimates[0].probability / truth - 1.0).abs() < 0.15, "{:?}", run.estimates[0]);
-        let proposal = run.search.proposal.unwrap();
+        let (estimates, search) = found(&density, &four_branch(near, far), 1);
+        assert!((estimates[0].probability / truth - 1.0).abs() < 0.15, "{:?}", estimates[0]);
+        let proposal = search.proposal.unwrap();
         for (x, y) in [(1.0, 1.0), (-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0)] {
             let is_near = |k: &usize| proposal.mean(*k)[0] * x > 1.0 && proposal.mean(*k)[1] * y > 1.0;
             assert!((0..proposal.weights().len()).any(|k| is_near(&k)), "nothing in the direction of {x}, {y}");
@@ -116,8 +118,8 @@ fn a_guide_that_misleads_costs_draws_but_not_the_estimate() {
         let value = |x: &Vec<f64>| if x[0] > 3.0 { -1.0 } else { 0.01 + libm::exp(0.1 * x[0]) };
         Ok(points.iter().map(value).collect())
     };
-    let run = found(&StandardNormal { dimensions: 3 }, &away, 2);
-    let estimate = &run.estimates[0];
+    let (estimates, _) = found(&StandardNormal { dimensions: 3 }, &away, 2);
+    let estimate = &estimates[0];
     assert!(estimate.interval.holds(tail(3.0)), "{estimate:?}");
 }
 
@@ -133,8 +135,8 @@ fn failures_in_the_tails_do_not_hide_more_likely_ones() {
     };
     let truth = tail(4.2) + tail(6.0);
     for seed in 0..5 {
-        let run = found(&StandardNormal { dimensions: 2 }, &pocket, seed);
-        let estimate = &run.estimates[0];
+        let (estimates, _) = found(&StandardNormal { dimensions: 2 }, &pocket, seed);
+        let estimate = &estimates[0];
         assert!((estimate.probability / truth - 1.0).abs() < 0.3, "{seed}: {estimate:?}");
     }
 }
@@ -153,11 +155,11 @@ impl LimitState for Halves {
 
 #[test]
 fn one_search_answers_several_questions_with_the_same_draws() {
-    let run = found(&StandardNormal { dimensions: 2 }, &Halves, 5);
-    for (estimate, beta) in run.estimates.iter().zip([2.5, 4.0, 4.5]) {
+    let (estimates, _) = found(&StandardNormal { dimensions: 2 }, &Halves, 5);
+    for (estimate, beta) in estimates.iter().zip([2.5, 4.0, 4.5]) {
         assert!((estimate.probability / tail(beta) - 1.0).abs() < 0.25, "{beta}: {estimate:?}");
         assert_eq!(estimate.trust.draws() == Verdict::Sound, beta < 4.5, "{beta}: {estimate:?}");
-        assert_eq!(estimate.runs, run.estimates[0].runs);
+        assert_eq!(estimate.runs, estimates[0].runs);
     }
 }
 
@@ -171,7 +173,7 @@ fn a_search_has_the_same_bits_with_one_thread() {
 #[test]
 fn a_truncated_density_is_searched_within_its_valid_region() {
     let half = Truncated::with_validity(unit_mixture(2), |x: &[f64]| x[1] > 0.0, 0.5).unwrap();
-    let run = found(&half, &linear(4.0), 4);
+    let (estimates, _) = found(&half, &linear(4.0), 4);
     // x₀ + x₁ > 4√2 with x₁ > 0: most of the tail, twice its density.
     let truth = {
         let (steps, width) = (200_000, 12.0 / 200_000.0);
@@ -179,7 +181,7 @@ fn a_truncated_density_is_searched_within_its_valid_region() {
         let of = |i: i32| (f64::from(i) + 0.5) * width;
         2.0 * (0..steps).map(|i| density(of(i)) * tail(4.0 * std::f64::consts::SQRT_2 - of(i)) * width).sum::<f64>()
     };
-    assert!((run.estimates[0].probability / truth - 1.0).abs() < 0.15, "{:?} beside {truth}", run.estimates[0]);
+    assert!((estimates[0].probability / truth - 1.0).abs() < 0.15, "{:?} beside {truth}", estimates[0]);
 }
 
 #[test]
@@ -210,8 +212,8 @@ fn a_proposal_that_misses_a_way_to_fail_makes_the_interval_wider_but_not_wrong()
 #[test]
 fn a_search_without_failures_is_followed_by_draws_of_the_density_that_bound_the_probability() {
     let never = |points: &[Vec<f64>]| Ok(vec![1.0; points.len()]);
-    let run = found(&StandardNormal { dimensions: 2 }, &never, 1);
-    let estimate = &run.estimates[0];
+    let (estimates, _) = found(&StandardNormal { dimensions: 2 }, &never, 1);
+    let estimate = &estimates[0];
     assert_eq!((estimate.probability, estimate.trust.draws()), (0.0, Verdict::Doubtful));
     assert!((3.6e-6..3.8e-6).contains(&estimate.interval.high), "{estimate:?}");
     assert!(estimate.trust.warnings.contains(&Warning::NoFailures));

@@ -5,6 +5,7 @@
 
 use crate::common;
 use crate::common::mined::{provenance, scenarios};
+use crate::common::reliability::adaptive;
 
 use std::path::PathBuf;
 
@@ -16,7 +17,7 @@ use lanesweep::run::sampling::{Estimator, LaneLimitState, Question, Sample, Samp
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::{DensityModel, FitOptions, read_density};
-use lanesweep::stats::estimate::{Estimate, Goal, Search, Verdict, adaptive, wilson};
+use lanesweep::stats::estimate::{Estimate, Goal, Search, Verdict, wilson};
 use lanesweep::traffic::mining::{MiningOptions, mine_folder};
 
 const LEVEL: f64 = 0.999;
@@ -57,7 +58,7 @@ fn adaptive_estimate(
     let question = Question { model, criterion: Criterion::Collision, headway: 0 };
     let lanes = LaneLimitState::new(density, profile, &headways, &[question], Executor::new(&backend));
     let nominal = truncated(density).unwrap();
-    adaptive(&nominal, &lanes, &Search::default(), goal, seed, LEVEL).unwrap().estimates.remove(0)
+    adaptive(&nominal, &lanes, &Search::default(), goal, seed, LEVEL).unwrap().0.remove(0)
 }
 
 /// A model and a headway at which the probability is between these.

@@ -253,7 +253,7 @@ mod tests {
     use super::*;
     use std::sync::Arc;
 
-    use crate::engine::verify::{RandomOptions, random_plan};
+    use crate::engine::verify::{SetOptions, random_plan};
     use crate::engine::{Backend, Chunk, CpuBackend, Executor, LanePlan, LaneRunner, Wanted};
     use crate::model::driver::{Accelerations, DriverProfile};
     use crate::model::profile::Profile;
@@ -318,7 +318,7 @@ mod tests {
     }
 
     fn plan(models: Vec<ModelId>) -> LanePlan {
-        let options = RandomOptions { lanes_per_model_and_category: 2000, models, ..Default::default() };
+        let options = SetOptions { size: 2000, models, ..Default::default() };
         random_plan(&Profile::load("paper").unwrap(), &options).unwrap()
     }
 

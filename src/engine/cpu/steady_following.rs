@@ -57,7 +57,7 @@ mod tests {
     use crate::model::driver::{DriverProfile, DriverState};
     use crate::model::profile::Profile;
     use crate::model::scalar::Flag;
-    use crate::random::{philox4x32_10, unit_uniform};
+    use crate::random::philox4x32_10;
     use crate::scenario::Category;
 
     /// A lane behind a vehicle that keeps its speed, at some step of its run: the ego brakes or has braked.
@@ -65,7 +65,7 @@ mod tests {
         let mut drawn = 0;
         let mut between = |min: f32, max: f32| {
             drawn += 1;
-            min + (max - min) * unit_uniform(philox4x32_10([drawn, number, 0, 0], [11, 0])[0])
+            min + (max - min) * philox4x32_10([drawn, number, 0, 0], [11, 0])[0] as f32 / 2_f32.powi(32)
         };
         let speed = between(0.0, 40.0);
         let place = OtherState { speed, position: between(-2.2, 2.2), towards: 0.0 };

@@ -151,7 +151,6 @@ impl Generator {
         };
         let mut all = vec![
             ("points_source", source),
-            ("points_weighted", flag(points.weights.is_some())),
             ("recipe_path", f64::from(recipe.path)),
             ("recipe_lateral", f64::from(recipe.lateral)),
             ("recipe_dimensions", f64::from(recipe.dimensions)),

@@ -1,7 +1,7 @@
-//! Sample index → point: a Gaussian mixture drawn with counter-based random words or with scrambled Sobol points, or a
-//! table of given points. Twin: `shaders/shared/points.wgsl`.
+//! Sample index → point: equal Gaussian kernels drawn with counter-based random words or with scrambled Sobol points, or
+//! a table of given points. Twin: `shaders/shared/points.wgsl`.
 
-use crate::random::{AliasTable, SOBOL_POINTS, Sobol, Stream, choose, standard_normal};
+use crate::random::{SOBOL_POINTS, Sobol, Stream, choose, standard_normal};
 
 /// Maximum number of parameters of a point.
 pub const MAX_PARAMETERS: usize = 14;
@@ -17,8 +17,8 @@ const BLOCKS: u32 = 4;
 pub enum PointSource {
     /// Philox: independent draws; an invalid point is redrawn.
     Random(Stream),
-    /// Owen-scrambled Sobol points. An invalid point is void, because a redraw would destroy their balance. Two
-    /// coordinates select the component, one more is used per parameter.
+    /// Owen-scrambled Sobol points. An invalid point is void, because a redraw would destroy their balance. One
+    /// coordinate selects the component, one is unused, and there is one per parameter.
     Sobol(Sobol),
     /// Point `i` is mean `i`.
     Given,
@@ -47,20 +47,16 @@ pub struct Points {
     pub source: PointSource,
     /// Parameters of a point, 1 to [`MAX_PARAMETERS`].
     pub dimensions: usize,
-    /// Alias table of the components' weights; `None` if all are equal.
-    pub weights: Option<AliasTable>,
     /// Means, `dimensions` per component.
     pub means: Vec<f32>,
-    /// Index of each component's factor.
-    pub factor_of: Vec<u32>,
-    /// Factors: `dimensions`² each, row by row, zeros above the diagonal.
-    pub factors: Vec<f32>,
+    /// Standard deviation of every component, one per parameter.
+    pub deviations: Vec<f32>,
 }
 
 impl Points {
     /// Number of components.
     pub fn components(&self) -> u32 {
-        self.factor_of.len() as u32
+        (self.means.len() / self.dimensions) as u32
     }
 
     /// Number of points; `None` if every index has one. A [plan](crate::engine::LanePlan) holds no sample beyond.
@@ -93,43 +89,28 @@ impl Points {
     pub(crate) fn range(&self, parameter: usize) -> [f64; 2] {
         let d = self.dimensions;
         let largest = f64::from(standard_normal(u32::MAX));
-        let spread = |component: usize| match self.source {
+        let spread = match self.source {
             PointSource::Given => 0.0,
-            PointSource::Random(_) | PointSource::Sobol(_) => {
-                let factor = &self.factors[self.factor_of[component] as usize * d * d + parameter * d..][..d];
-                largest * factor.iter().map(|number| f64::from(number.abs())).sum::<f64>()
-            }
+            PointSource::Random(_) | PointSource::Sobol(_) => largest * f64::from(self.deviations[parameter]),
         };
-        let mut range = [f64::INFINITY, f64::NEG_INFINITY];
-        for component in 0..self.factor_of.len() {
-            let mean = f64::from(self.means[component * d + parameter]);
-            range = [range[0].min(mean - spread(component)), range[1].max(mean + spread(component))];
-        }
-        range
+        let means = self.means.iter().skip(parameter).step_by(d).map(|mean| f64::from(*mean));
+        means.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], mean| {
+            [low.min(mean - spread), high.max(mean + spread)]
+        })
     }
 
     /// The kernel of draw `tries` (from 1) of an index. `None` for given points.
     pub fn component(&self, index: u64, tries: u32) -> Option<u32> {
-        let [a, b] = match &self.source {
-            PointSource::Random(stream) => {
-                let [a, b, ..] = stream.words(index, tries.checked_sub(1)? * BLOCKS);
-                [a, b]
-            }
-            PointSource::Sobol(sobol) => [sobol.word(index, 0)?, sobol.word(index, 1)?],
+        let word = match &self.source {
+            PointSource::Random(stream) => stream.words(index, tries.checked_sub(1)? * BLOCKS)[0],
+            PointSource::Sobol(sobol) => sobol.word(index, 0)?,
             PointSource::Given => return None,
         };
-        Some(self.chosen(a, b))
+        Some(choose(word, self.components()))
     }
 
-    #[inline]
-    fn chosen(&self, word_a: u32, word_b: u32) -> u32 {
-        match &self.weights {
-            Some(table) => table.pick(word_a, word_b),
-            None => choose(word_a, self.components()),
-        }
-    }
-
-    /// Draw `attempt` of an index, valid or not. Words 0 and 1 select the component, the others are normal deviates.
+    /// Draw `attempt` of an index, valid or not. Word 0 selects the component, word 1 is unused, the others are normal
+    /// deviates.
     #[inline]
     pub fn attempt(&self, index: u64, attempt: u32) -> [f32; MAX_PARAMETERS] {
         let d = self.dimensions;
@@ -154,20 +135,10 @@ impl Points {
                 return values;
             }
         }
-        let component = self.chosen(words[0], words[1]) as usize;
-        let factor = &self.factors[self.factor_of[component] as usize * d * d..][..d * d];
-        let mean = &self.means[component * d..][..d];
-        let mut deviates = [0.0; MAX_PARAMETERS];
-        for (deviate, &word) in deviates.iter_mut().zip(&words[2..2 + d]) {
-            *deviate = standard_normal(word);
-        }
+        let mean = &self.means[choose(words[0], self.components()) as usize * d..][..d];
         let mut values = [0.0; MAX_PARAMETERS];
         for j in 0..d {
-            let mut value = mean[j];
-            for k in 0..=j {
-                value += factor[j * d + k] * deviates[k];
-            }
-            values[j] = value;
+            values[j] = mean[j] + self.deviations[j] * standard_normal(words[2 + j]);
         }
         values
     }
@@ -178,8 +149,7 @@ mod tests {
     use super::*;
 
     fn points(source: PointSource) -> Points {
-        let (means, factor_of) = (vec![1.0, 2.0, 3.0], vec![0, 0, 0]);
-        Points { source, dimensions: 1, weights: None, means, factor_of, factors: vec![1.0] }
+        Points { source, dimensions: 1, means: vec![1.0, 2.0, 3.0], deviations: vec![1.0] }
     }
 
     #[test]
@@ -195,13 +165,8 @@ mod tests {
     #[test]
     fn no_draw_leaves_the_range_of_its_parameter() {
         let stream = PointSource::Random(Stream { seed: 7, purpose: 0 });
-        let points = Points {
-            dimensions: 2,
-            means: vec![1.0, -2.0, 3.0, 5.0],
-            factor_of: vec![0, 1],
-            factors: vec![0.5, 0.0, -0.25, 1.0, 2.0, 0.0, 0.0, 0.125],
-            ..points(stream)
-        };
+        let points =
+            Points { dimensions: 2, means: vec![1.0, -2.0, 3.0, 5.0], deviations: vec![0.5, 2.0], ..points(stream) };
         let ranges = [points.range(0), points.range(1)];
         assert!(ranges.iter().all(|[low, high]| high - low < 30.0), "{ranges:?}");
         for index in 0..20_000 {

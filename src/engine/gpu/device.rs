@@ -388,10 +388,10 @@ fn entries() -> Vec<wgpu::BindGroupLayoutEntry> {
     buffer_entries(4, 3, true)
 }
 
-/// The bindings of `shaders/generate.wgsl`, in their order: generation, five inputs, cases, instants and
+/// The bindings of `shaders/generate.wgsl`, in their order: generation, four inputs, cases, instants and
 /// what is counted of samples.
 fn generator_entries() -> Vec<wgpu::BindGroupLayoutEntry> {
-    buffer_entries(5, 3, false)
+    buffer_entries(4, 3, false)
 }
 
 /// The bindings of `shaders/tally.wgsl`, in their order: tally, samples and verdicts, counts and samples left.

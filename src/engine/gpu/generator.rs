@@ -27,7 +27,6 @@ pub(super) struct GeneratorInputs {
     pub generation: wgpu::Buffer,
     pub recipe: wgpu::Buffer,
     pub numbers: wgpu::Buffer,
-    pub aliases: wgpu::Buffer,
     pub sobol: wgpu::Buffer,
     pub normal: wgpu::Buffer,
 }
@@ -38,7 +37,6 @@ pub(super) struct GeneratorSetup {
     recipe: Recipe,
     constants: Vec<(&'static str, f64)>,
     numbers: Vec<u32>,
-    aliases: Vec<[u32; 2]>,
     sobol: Vec<u32>,
 }
 
@@ -49,15 +47,12 @@ impl GeneratorSetup {
         let mut numbers = bits(&generator.basis);
         let first_mean = numbers.len() as u32;
         numbers.extend(bits(&points.means));
-        let first_factor = numbers.len() as u32;
-        numbers.extend(bits(&points.factors));
-        let first_factor_of = numbers.len() as u32;
-        numbers.extend(&points.factor_of);
+        let first_deviation = numbers.len() as u32;
+        numbers.extend(bits(&points.deviations));
         let mut generation = Generation {
             components: points.components(),
             first_mean,
-            first_factor,
-            first_factor_of,
+            first_deviation,
             stride: generator.case_instants(),
             ..Generation::default()
         };
@@ -71,9 +66,8 @@ impl GeneratorSetup {
             PointSource::Sobol(sobol) => sobol_words = sobol.table().concat(),
             PointSource::Given => (),
         }
-        let aliases = points.weights.as_ref().map_or(Vec::new(), |table| table.table().to_vec());
         let (recipe, constants) = (generator.recipe, generator.shader_constants());
-        GeneratorSetup { generation, recipe, constants, numbers, aliases, sobol: sobol_words }
+        GeneratorSetup { generation, recipe, constants, numbers, sobol: sobol_words }
     }
 
     /// Bytes of one sample: case, what is counted, and instants.
@@ -90,7 +84,6 @@ impl GeneratorSetup {
             generation: device.buffer("generation", size_of::<Generation>() as u64, Use::UNIFORM | Use::COPY_DST),
             recipe: device.upload("recipe", &[self.recipe])?,
             numbers: device.upload("numbers of the density", &self.numbers)?,
-            aliases: device.upload("weights of the density", &self.aliases)?,
             sobol: device.upload("Sobol directions", &self.sobol)?,
             normal: device.upload("normal deviates", normal_table())?,
         })
@@ -120,7 +113,6 @@ pub(super) fn generate(device: &mut Device, inputs: &mut Inputs, first: u64, cou
         &made.generation,
         &made.recipe,
         &made.numbers,
-        &made.aliases,
         &made.sobol,
         &made.normal,
         &inputs.cases,

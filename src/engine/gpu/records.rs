@@ -174,10 +174,8 @@ pub struct Generation {
     pub components: u32,
     /// Offset of the first mean in the numbers.
     pub first_mean: u32,
-    /// Offset of the first factor.
-    pub first_factor: u32,
-    /// Offset of the components' factor indices.
-    pub first_factor_of: u32,
+    /// Offset of the deviations.
+    pub first_deviation: u32,
     /// Entries of each sample in the table of instants.
     pub stride: u32,
 }

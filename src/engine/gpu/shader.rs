@@ -26,12 +26,10 @@ pub const SHARED: [(&str, &str); 13] = [
 ];
 
 /// Fragments of sampling, twins of `src/stats/random`, for a kernel that declares their tables: `normal_table:
-/// array<vec4<f32>>` ([`normal_table`](crate::random::normal_table)), `sobol_table: array<u32>`
-/// ([`Sobol::table`](crate::random::Sobol::table)) and `alias_table: array<vec2<u32>>`
-/// ([`AliasTable::table`](crate::random::AliasTable::table)).
-pub const RANDOM: [(&str, &str); 4] = [
+/// array<vec4<f32>>` ([`normal_table`](crate::random::normal_table)) and `sobol_table: array<u32>`
+/// ([`Sobol::table`](crate::random::Sobol::table)).
+pub const RANDOM: [(&str, &str); 3] = [
     ("shared/philox.wgsl", include_str!("../../../shaders/shared/philox.wgsl")),
-    ("shared/uniform.wgsl", include_str!("../../../shaders/shared/uniform.wgsl")),
     ("shared/normal.wgsl", include_str!("../../../shaders/shared/normal.wgsl")),
     ("shared/sobol.wgsl", include_str!("../../../shaders/shared/sobol.wgsl")),
 ];

@@ -14,8 +14,8 @@ mod series;
 mod thresholds;
 
 pub use decision::Threshold;
-pub use random::{RandomOptions, VARIANTS, random_plan};
-pub use thresholds::{SIDES, ThresholdOptions, threshold_plan};
+pub use random::{VARIANTS, random_plan};
+pub use thresholds::{SIDES, threshold_plan};
 
 use std::ops::Range;
 
@@ -30,13 +30,35 @@ use crate::scenario::Category;
 use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
-/// Refuses an empty list of categories, and a category named twice, because lane keys would be ambiguous.
-fn check_categories(categories: &[Category]) -> Result<()> {
-    let place = || Place::item("categories");
-    if categories.is_empty() {
-        return Err(Error::usage(place(), "the set has no category", "name at least one of cut_in, cut_out, lvd"));
+/// Options of a set.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SetOptions {
+    /// Seed; it determines all lanes.
+    pub seed: u64,
+    /// Random set: lanes of each model in each category, rounded up to whole units of 40. Threshold set: units of each
+    /// threshold in each category; a unit is 12 lanes of each model.
+    pub size: u64,
+    /// Categories, in order, each at most once.
+    pub categories: Vec<Category>,
+    /// Models, in order.
+    pub models: Vec<ModelId>,
+}
+
+impl Default for SetOptions {
+    fn default() -> Self {
+        SetOptions { seed: 157, size: 40, categories: Category::ALL.to_vec(), models: ModelId::ALL.to_vec() }
     }
-    refuse_repeats(place, categories.iter().map(|category| (*category, category.label())))
+}
+
+impl SetOptions {
+    /// Refuses a set without lanes, and a category named twice, because lane keys would be ambiguous.
+    fn check(&self) -> Result<()> {
+        let place = || Place::item("categories");
+        if self.categories.is_empty() || self.size == 0 {
+            return Err(Error::usage(place(), "the set has no lanes", "give a size, and one of cut_in, cut_out, lvd"));
+        }
+        refuse_repeats(place, self.categories.iter().map(|category| (*category, category.label())))
+    }
 }
 
 /// Purpose of a stream; streams of different purposes never share a number.
@@ -158,7 +180,7 @@ impl GroupComparison {
 /// A lane whose words differ.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DifferingLane {
-    /// Key, for `lanesweep verify --lane KEY`.
+    /// Key in its set.
     pub key: String,
     /// On the backend under test.
     pub tested: Outcome<f64>,
@@ -257,8 +279,8 @@ pub struct SelfCheck {
 /// Those of the backend.
 pub fn self_check(tested: &dyn Backend) -> Result<SelfCheck> {
     let profile = crate::model::profile::Profile::load("paper")?;
-    let random = RandomOptions { lanes_per_model_and_category: 400, ..Default::default() };
-    let thresholds = ThresholdOptions { units_per_threshold: 2, ..Default::default() };
+    let random = SetOptions { size: 400, ..Default::default() };
+    let thresholds = SetOptions { size: 2, ..Default::default() };
     let plans = [random_plan(&profile, &random)?, threshold_plan(&profile, &thresholds)?];
     let mut check = SelfCheck { lanes: 0, differing: 0 };
     for plan in &plans {

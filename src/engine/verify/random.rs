@@ -4,39 +4,15 @@
 use std::sync::Arc;
 
 use super::pool::{LateralRole, Pool, Slice};
-use super::{CaseRandom, Purpose, check_categories};
+use super::{CaseRandom, Purpose, SetOptions};
+use crate::Result;
 use crate::engine::{Block, CaseSource, Headway, LaneCase, LaneOther, LanePlan, NO_STEP};
-use crate::model::driver::{MODELS, ModelId};
+use crate::model::driver::MODELS;
 use crate::model::profile::{CutOutTarget, Profile};
 use crate::scenario::{Ahead, Case, Category, LATERAL_SAMPLED, Lateral, Participant, SPEED_SAMPLED, Speed, Tables};
-use crate::{Error, Place, Result};
 
 /// Variants of every unit: all motions sampled (`S`), all kinematic, one of each, and corner cases.
 pub const VARIANTS: [&str; 4] = ["S", "kinematic", "mixed", "degenerate"];
-
-/// Options of a random set.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct RandomOptions {
-    /// Seed; it determines all lanes.
-    pub seed: u64,
-    /// Lanes of each model in each category, rounded up to whole units of 40.
-    pub lanes_per_model_and_category: u64,
-    /// Categories, in order, each at most once.
-    pub categories: Vec<Category>,
-    /// Models, in order.
-    pub models: Vec<ModelId>,
-}
-
-impl Default for RandomOptions {
-    fn default() -> Self {
-        RandomOptions {
-            seed: 157,
-            lanes_per_model_and_category: 1_000_000,
-            categories: Category::ALL.to_vec(),
-            models: ModelId::ALL.to_vec(),
-        }
-    }
-}
 
 /// Ten starts by time and by distance: far, near, touching, overlapping along the road, and behind.
 fn headways() -> Vec<Headway> {
@@ -48,15 +24,11 @@ fn headways() -> Vec<Headway> {
 /// Plans the random set of a seed. Keys are `random-cut-in-seed157-0000123`; the number is that of the unit.
 ///
 /// # Errors
-/// [`Error::Usage`] without lanes, categories or models, or if a category is named twice.
-pub fn random_plan(profile: &Profile, options: &RandomOptions) -> Result<LanePlan> {
-    check_categories(&options.categories)?;
-    if options.lanes_per_model_and_category == 0 {
-        let place = Place::item("lanes_per_model_and_category");
-        return Err(Error::usage(place, "the set has no lanes", "ask for at least one lane"));
-    }
+/// [`Error::Usage`] without a size, categories or models, or if a category is named twice.
+pub fn random_plan(profile: &Profile, options: &SetOptions) -> Result<LanePlan> {
+    options.check()?;
     let headways = headways();
-    let units = options.lanes_per_model_and_category.div_ceil((headways.len() * VARIANTS.len()) as u64);
+    let units = options.size.div_ceil((headways.len() * VARIANTS.len()) as u64);
     let block = |&category: &Category| {
         let name = |unit| format!("random-{}-seed{}-{unit:07}", category.key().replace('_', "-"), options.seed);
         Block::new(category, (0..units).map(name).collect(), VARIANTS.map(str::to_owned).to_vec())
@@ -100,7 +72,7 @@ const FROZEN: usize = 32;
 const FROZEN_TRIES: u64 = 2048;
 
 impl RandomCases {
-    fn new(profile: &Profile, options: &RandomOptions) -> RandomCases {
+    fn new(profile: &Profile, options: &SetOptions) -> RandomCases {
         let mut cases = RandomCases {
             seed: options.seed,
             profile: profile.clone(),

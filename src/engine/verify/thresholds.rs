@@ -4,55 +4,26 @@
 
 use std::sync::Arc;
 
-use super::check_categories;
+use super::SetOptions;
 use super::decision::{HEADWAYS, Threshold};
 use super::first_step::ThresholdCases;
+use crate::Result;
 use crate::engine::{Block, LanePlan};
-use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::scenario::Category;
-use crate::{Error, Place, Result};
 
 /// Variants of every unit: on the threshold (`S`), and the deciding quantity one ULP smaller and larger. Around 0 the
 /// neighbours are ±2⁻³², which no device flushes; steps and times change by one step.
 pub const SIDES: [&str; 3] = ["S", "below", "above"];
 
-/// Options of a threshold set.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ThresholdOptions {
-    /// Seed of the situations around the thresholds.
-    pub seed: u64,
-    /// Units of each threshold in each category; a unit is 12 lanes of each model.
-    pub units_per_threshold: u64,
-    /// Categories, in order, each at most once.
-    pub categories: Vec<Category>,
-    /// Models, in order.
-    pub models: Vec<ModelId>,
-}
-
-impl Default for ThresholdOptions {
-    fn default() -> Self {
-        ThresholdOptions {
-            seed: 157,
-            units_per_threshold: 64,
-            categories: Category::ALL.to_vec(),
-            models: ModelId::ALL.to_vec(),
-        }
-    }
-}
-
 /// Plans the threshold set of a seed. Keys are `threshold-rss-lateral-cut-in-seed157-000012`; the number is that of
 /// the unit in its category, for any size.
 ///
 /// # Errors
-/// [`Error::Usage`] without units, categories or models, or if a category is named twice.
-pub fn threshold_plan(profile: &Profile, options: &ThresholdOptions) -> Result<LanePlan> {
-    check_categories(&options.categories)?;
-    if options.units_per_threshold == 0 {
-        let place = Place::item("units_per_threshold");
-        return Err(Error::usage(place, "the set has no lanes", "ask for at least one unit"));
-    }
-    let units = options.units_per_threshold * Threshold::ALL.len() as u64;
+/// [`Error::Usage`] without a size, categories or models, or if a category is named twice.
+pub fn threshold_plan(profile: &Profile, options: &SetOptions) -> Result<LanePlan> {
+    options.check()?;
+    let units = options.size * Threshold::ALL.len() as u64;
     let key = |category: Category, unit: u64| {
         let (threshold, category) = (Threshold::of_unit(unit).name(), category.key().replace('_', "-"));
         format!("threshold-{threshold}-{category}-seed{}-{unit:06}", options.seed)

@@ -255,7 +255,7 @@ mod tests {
     use super::*;
     use crate::model::category::Category;
     use crate::model::profile::Profile;
-    use lanesweep_random::random::{philox4x32_10, unit_uniform};
+    use lanesweep_random::random::philox4x32_10;
 
     #[test]
     fn delays_are_whole_steps_rounded_up_without_the_error_of_the_quotient() {
@@ -273,7 +273,7 @@ mod tests {
         let mut drawn = 0;
         let mut between = |min: f32, max: f32| {
             drawn += 1;
-            min + (max - min) * unit_uniform(philox4x32_10([drawn, 0, 0, 0], [7, 0])[0])
+            min + (max - min) * philox4x32_10([drawn, 0, 0, 0], [7, 0])[0] as f32 / 2_f32.powi(32)
         };
         let (mut unsafe_below, mut safe, mut ignored) = (0, 0, 0);
         let (mut is_steady, mut unsteady_below) = (0, 0);

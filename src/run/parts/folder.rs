@@ -42,7 +42,7 @@ fn collect(dir: &Path, units: u64, again: impl Fn(Shard) -> String) -> Result<Ve
         }
     }
     if parts.is_empty() {
-        let help = format!("make the parts first, such as: {}", again(Shard { index: 0, of: 1 }));
+        let help = format!("make the parts first, such as:\n{}", again(Shard { index: 0, of: 1 }));
         return Err(Error::input(Place::file(dir), "there is no part here", help));
     }
     parts.sort_by_key(|(shard, _)| (shard.units(units).start, shard.units(units).end, shard.of));
@@ -150,7 +150,7 @@ pub fn read_part<T: MergeableCounts>(
     units: &Range<u64>,
     again: &str,
 ) -> Result<Part<T>> {
-    let redo = format!("delete it and make it again: {again}");
+    let redo = format!("delete it and make it again:\n{again}");
     let (part, _): (Part<T>, _) = read_sealed("part", path, MAX_BYTES, &redo)?;
     let wrong = |problem: String, help: &str| Error::input(Place::file(path), problem, help);
     if part.run_sha256 != run_sha256 {

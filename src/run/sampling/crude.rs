@@ -12,7 +12,7 @@ use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::parts::{Computed, EachChunk, Ledger};
 use crate::stats::density::Exposure;
-use crate::stats::estimate::{Checkpoints, StopReason, StopRule};
+use crate::stats::estimate::{StopReason, StopRule, next_checkpoint};
 use crate::{Error, Place, Result};
 
 /// Estimates after a number of samples.
@@ -51,7 +51,7 @@ pub struct CrudeRun {
 
 /// The sample sizes at which a run of `samples` samples is evaluated, and at which its counts are cut.
 pub(super) fn checkpoints(samples: u64) -> Vec<u64> {
-    let next = |at: &u64| Some(Checkpoints::Doubling.next(*at)).filter(|next| *next > *at);
+    let next = |at: &u64| Some(next_checkpoint(*at));
     std::iter::successors(next(&0), next).take_while(|at| *at < samples).chain([samples]).collect()
 }
 

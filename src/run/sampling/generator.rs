@@ -10,10 +10,10 @@ use crate::engine::generated::{
 };
 use crate::model::profile::{CutOutEvaluated, CutOutTarget, Profile};
 use crate::model::scalar::Real;
-use crate::random::{AliasTable, Sobol, Stream};
+use crate::random::{Sobol, Stream};
 use crate::scenario::Category;
 use crate::scenario::parameterization::{AfterDuration, ReducedSeries, Sizes, Variable};
-use crate::stats::density::{Mixture, ParameterSpace};
+use crate::stats::density::{Kde, ParameterSpace};
 use crate::{Error, Place, Result};
 
 /// Purpose of the random stream of the samples.
@@ -39,44 +39,29 @@ impl SampleSource {
     }
 }
 
-/// The generator that draws from a mixture over a parameter space.
+/// The generator that draws from the kernels of a density over a parameter space.
 ///
 /// # Errors
 /// [`Error::Usage`] for more than [`MAX_PARAMETERS`] parameters, a profile whose cut-outs begin at the exposure, or
 /// more Sobol dimensions than available; [`Error::Input`] for a cut-out without the size of the vehicle ahead.
 pub fn generator_of(
     space: &ParameterSpace,
-    mixture: &Mixture,
+    kde: &Kde,
     sizes: &Sizes,
     profile: &Profile,
     source: SampleSource,
     seed: u64,
 ) -> Result<Generator> {
-    let d = mixture.dimensions();
-    let n = mixture.weights().len();
-    let is_even = mixture.weights().iter().all(|w| *w == mixture.weights()[0]);
-    let mut points = Points {
+    let dimensions = space.dimensions();
+    let points = Points {
         source: match source {
             SampleSource::Random => PointSource::Random(Stream { seed, purpose: SAMPLE_PURPOSE }),
-            SampleSource::Sobol => PointSource::Sobol(Sobol::new(seed, 2 + d as u32)?),
+            SampleSource::Sobol => PointSource::Sobol(Sobol::new(seed, 2 + dimensions as u32)?),
         },
-        dimensions: d,
-        weights: if is_even { None } else { Some(AliasTable::new(mixture.weights())?) },
-        means: Vec::with_capacity(n * d),
-        factor_of: Vec::with_capacity(n),
-        factors: Vec::new(),
+        dimensions,
+        means: kde.points().iter().flatten().map(|&v| rounded(v)).collect(),
+        deviations: kde.spread().iter().map(|&v| v as f32).collect(),
     };
-    for component in 0..n {
-        points.means.extend(mixture.mean(component).iter().map(|&v| rounded(v)));
-        let factor: Vec<f32> = mixture.factor(component).transpose().iter().map(|&v| v as f32).collect();
-        // All kernels share one factor.
-        let known = points.factors.len() / (d * d);
-        let last = known.checked_sub(1).filter(|&at| points.factors[at * d * d..] == factor);
-        points.factor_of.push(last.unwrap_or(known) as u32);
-        if last.is_none() {
-            points.factors.extend(factor);
-        }
-    }
     assembled(space, points, sizes, profile)
 }
 
@@ -97,10 +82,8 @@ pub fn generator_of_points(
     let points = Points {
         source: PointSource::Given,
         dimensions: d,
-        weights: None,
         means: points.iter().flatten().map(|&v| rounded(v)).collect(),
-        factor_of: vec![0; points.len()],
-        factors: vec![0.0; d * d],
+        deviations: vec![0.0; d],
     };
     assembled(space, points, sizes, profile)
 }

@@ -28,9 +28,8 @@ pub fn plan_samples(density: &DensityModel, profile: &Profile, options: &SampleO
         let problem = format!("{samples} Sobol points are asked for, {SOBOL_POINTS} there are");
         return Err(Error::usage(place(), problem, "use independent random points beyond"));
     }
-    let kernels = density.kde.mixture()?;
     let (source, seed) = (options.source, options.seed);
-    let generator = generator_of(&density.space, &kernels, &density.sizes, profile, source, seed)?;
+    let generator = generator_of(&density.space, &density.kde, &density.sizes, profile, source, seed)?;
     plan(density, profile, generator, samples, &options.models, &options.headways)
 }
 
@@ -46,8 +45,8 @@ pub(super) fn plan_draws(
     models: &[ModelId],
     headways: &SampleHeadways,
 ) -> Result<LanePlan> {
-    let (kernels, source) = (density.kde.mixture()?, SampleSource::Random);
-    let mut generator = generator_of(&density.space, &kernels, &density.sizes, profile, source, stream.seed)?;
+    let source = SampleSource::Random;
+    let mut generator = generator_of(&density.space, &density.kde, &density.sizes, profile, source, stream.seed)?;
     generator.points.source = PointSource::Random(stream);
     plan(density, profile, generator, draws, models, headways)
 }

@@ -125,22 +125,6 @@ pub fn from_weight_sums(sums: &WeightSums, level: f64) -> Estimate {
     estimate
 }
 
-/// Samples the proposal and the density; returns the estimate of every question. The proposal decides how wide the
-/// intervals are, never what they hold: failures that it misses are met by the draws of the density, or bounded.
-///
-/// # Errors
-/// Those of the limit state.
-pub fn importance(
-    nominal: &dyn Density,
-    proposal: &Mixture,
-    limit_state: &dyn LimitState,
-    options: &Importance,
-    level: f64,
-) -> Result<Vec<Estimate>> {
-    let sums = importance_sums(nominal, proposal, limit_state, options, 0..options.draws)?;
-    Ok(sums.iter().map(|sums| from_weight_sums(&sums.total().unwrap_or_default(), level)).collect())
-}
-
 /// The estimate from points that another program drew. `log_ratios` holds ln f − ln g of each: f is the density of the
 /// question, normalized over its valid region (−∞ outside), g the density that the points were drawn from. Where g is
 /// small and failures are possible, nothing bounds what was missed.

@@ -8,7 +8,6 @@ use rayon::prelude::*;
 
 use crate::random::Stream;
 use crate::stats::density::Mixture;
-use crate::stats::density::normal::normal;
 use crate::{Error, Place, Result};
 
 /// Maximum number of attempts at a valid point; after these the index is void. With a valid fraction of one half, one
@@ -92,38 +91,6 @@ impl Density for Mixture {
     fn mixture(&self) -> Option<Mixture> {
         Some(self.clone())
     }
-}
-
-/// Independent standard normal parameters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct StandardNormal {
-    /// Number of parameters.
-    pub dimensions: usize,
-}
-
-impl Density for StandardNormal {
-    fn dimensions(&self) -> usize {
-        self.dimensions
-    }
-
-    fn log_density(&self, point: &[f64]) -> f64 {
-        let square: f64 = point.iter().map(|x| x * x).sum();
-        -0.5 * (square + self.dimensions as f64 * libm::log(2.0 * std::f64::consts::PI))
-    }
-
-    fn attempt(&self, stream: &Stream, index: u64, attempt: u32) -> Vec<f64> {
-        normals(stream, index, attempt.wrapping_mul(self.dimensions.div_ceil(4) as u32), self.dimensions)
-    }
-
-    fn mixture(&self) -> Option<Mixture> {
-        Mixture::of_kernels(vec![vec![0.0; self.dimensions]], &vec![1.0; self.dimensions]).ok()
-    }
-}
-
-/// Standard normal numbers of an index, starting at a block.
-pub(crate) fn normals(stream: &Stream, index: u64, first_block: u32, count: usize) -> Vec<f64> {
-    let blocks = 0..count.div_ceil(4) as u32;
-    blocks.flat_map(|b| stream.words(index, first_block + b)).take(count).map(normal).collect()
 }
 
 /// A mixture truncated by a validity rule.

@@ -5,9 +5,9 @@
 //! are passed to the limit state in batches, because it runs on vector hardware. The same seed gives the same bits for
 //! any number of threads and any division of the indices.
 
-mod adaptive;
 mod blocks;
 mod evaluated_points;
+mod goal;
 mod importance;
 mod interval;
 mod kernels;
@@ -21,16 +21,16 @@ mod summary;
 mod warnings;
 mod weights;
 
-pub use adaptive::{AdaptiveRun, Goal, adaptive};
 pub use blocks::{BlockSums, Join};
-pub use importance::{Importance, from_weight_sums, importance, importance_of_points, importance_sums};
+pub use goal::Goal;
+pub use importance::{Importance, from_weight_sums, importance_of_points, importance_sums};
 pub use interval::{Interval, IntervalKind, wilson};
 pub use kernels::{KernelShares, kernel_shares};
-pub use limit_state::{ATTEMPTS, Density, Draw, Failure, LimitState, StandardNormal, Truncated};
+pub use limit_state::{ATTEMPTS, Density, Draw, Failure, LimitState, Truncated};
 pub use monte_carlo::{BinomialInterval, Counts, from_clusters, from_counts};
 pub use ratio::{ClusterRate, Clusters, Ratio, RatioMethod, RatioVerdict, cluster_rate, paired_ratio};
 pub use search::{Found, Search, SearchRound, SearchRun, search};
-pub use stop::{Checkpoints, StopReason, StopRule};
+pub use stop::{StopReason, StopRule, next_checkpoint};
 pub use summary::Estimate;
 pub use warnings::{Trust, Verdict, Warning};
 pub use weights::{WeightFigures, WeightSums};

@@ -209,7 +209,7 @@ pub fn paired_ratio(numerator: Clusters, denominator: Clusters, level: f64) -> R
 mod tests {
     use super::super::{StopReason, from_clusters};
     use super::*;
-    use crate::random::{Stream, unit_uniform};
+    use crate::random::Stream;
 
     #[test]
     fn clusters_of_equal_size_have_the_interval_of_equal_clusters() {
@@ -294,7 +294,7 @@ mod tests {
                 let mut block = 0;
                 let mut uniform = || {
                     block += 1;
-                    f64::from(unit_uniform(stream.words(cluster, block)[0]))
+                    f64::from(stream.words(cluster, block)[0]) / 2_f64.powi(32)
                 };
                 let q = uniform() * uniform();
                 let size = 20 + (uniform() * 20.0) as u64;

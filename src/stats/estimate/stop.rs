@@ -7,33 +7,10 @@ use serde::{Deserialize, Serialize};
 
 use super::blocks::BLOCK;
 
-/// Sample sizes at which the rules are evaluated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Checkpoints {
-    /// 4,096 · 2^k: few evaluations, so repeated testing affects the interval little.
-    #[default]
-    Doubling,
-    /// Every so many samples, rounded up to blocks of 4,096.
-    Every(u64),
-}
-
-impl Checkpoints {
-    /// The first checkpoint after `samples`.
-    pub fn next(self, samples: u64) -> u64 {
-        match self {
-            Checkpoints::Doubling => {
-                let mut at = BLOCK;
-                while at <= samples && at < 1 << 62 {
-                    at *= 2;
-                }
-                at
-            }
-            Checkpoints::Every(step) => {
-                let step = step.max(1).div_ceil(BLOCK) * BLOCK;
-                (samples / step + 1) * step
-            }
-        }
-    }
+/// The first sample size after `samples` at which the rules are evaluated: 4,096 · 2^k. Few evaluations, so repeated
+/// testing affects the interval little.
+pub fn next_checkpoint(samples: u64) -> u64 {
+    BLOCK.saturating_mul((samples / BLOCK + 1).next_power_of_two())
 }
 
 /// When to end. A plan file stores only the number of samples, because the draws do not depend on the other rules.
@@ -48,9 +25,6 @@ pub struct StopRule {
     /// End at the first checkpoint after this time. The result then depends on the machine and says so.
     #[serde(skip)]
     pub time_limit: Option<Duration>,
-    /// When the rules are evaluated.
-    #[serde(skip)]
-    pub checkpoints: Checkpoints,
 }
 
 /// Reason for the end of a sample.
@@ -83,7 +57,7 @@ impl StopRule {
 
     /// `samples` samples and no other rule.
     pub fn samples(samples: u64) -> StopRule {
-        StopRule { samples, relative_half_width: None, time_limit: None, checkpoints: Checkpoints::Doubling }
+        StopRule { samples, relative_half_width: None, time_limit: None }
     }
 
     /// Whether to end at this checkpoint.
@@ -107,15 +81,8 @@ mod tests {
 
     #[test]
     fn checkpoints_are_functions_of_the_sample_size_only() {
-        let mut at = 0;
-        let mut doubling = Vec::new();
-        for _ in 0..4 {
-            at = Checkpoints::Doubling.next(at);
-            doubling.push(at);
-        }
-        assert_eq!(doubling, [4096, 8192, 16_384, 32_768]);
-        assert_eq!(Checkpoints::Every(65_536).next(65_536), 131_072);
-        assert_eq!(Checkpoints::Every(5000).next(1), 8192);
+        assert_eq!([0, 4095, 4096, 8192, 16_384].map(next_checkpoint), [4096, 4096, 8192, 16_384, 32_768]);
+        assert!(next_checkpoint(1 << 63) > 1 << 63);
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::time::Duration;
 
-use lanesweep::engine::verify::{RandomOptions, random_plan};
+use lanesweep::engine::verify::{SetOptions, random_plan};
 use lanesweep::engine::{Backend, Chunk, CpuBackend, Executor, LanePlan, Partial, Session, Wanted};
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::{Journal, Ledger};
@@ -82,7 +82,7 @@ fn journalled(plan: &LanePlan, backend: &dyn Backend, path: &Path) -> Result<(u6
 
 #[test]
 fn after_a_panic_in_a_worker_or_a_lost_device_the_journal_is_whole_and_another_backend_ends_the_run() {
-    let options = RandomOptions { lanes_per_model_and_category: 800, ..Default::default() };
+    let options = SetOptions { size: 800, ..Default::default() };
     let plan = random_plan(&Profile::load("paper").unwrap(), &options).unwrap();
     let dir = tempfile::tempdir().unwrap();
     let cpu = CpuBackend::lane_arithmetic();
@@ -106,7 +106,7 @@ fn after_a_panic_in_a_worker_or_a_lost_device_the_journal_is_whole_and_another_b
 
 #[test]
 fn a_device_that_is_lost_in_mid_run_is_stood_in_for_and_the_counts_are_the_same() {
-    let options = RandomOptions { lanes_per_model_and_category: 800, ..Default::default() };
+    let options = SetOptions { size: 800, ..Default::default() };
     let plan = random_plan(&Profile::load("paper").unwrap(), &options).unwrap();
     let cpu = CpuBackend::lane_arithmetic();
     let counted = |backend: &dyn Backend| {

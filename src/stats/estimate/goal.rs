@@ -1,12 +1,9 @@
-//! Importance sampling with a proposal that a search finds: the estimator of rare failures.
+//! The accuracy of importance sampling with a proposal that a search finds.
 
 use serde::{Deserialize, Serialize};
 
-use super::importance::{Importance, importance};
-use super::limit_state::{Density, LimitState};
-use super::search::{Found, Search, SearchRun, search};
-use super::summary::Estimate;
-use crate::Result;
+use super::importance::Importance;
+use super::search::Found;
 use crate::stats::density::normal_quantile;
 
 /// Factor on the number of draws that a search predicts, because it knows the variance only roughly.
@@ -50,34 +47,4 @@ impl Goal {
         let crude = found.iter().map(crude).fold(0.0, f64::max).min(self.max_crude as f64);
         Importance { seed, draws, crude_per_draw: ((crude / draws as f64).ceil() as u64).max(1) }
     }
-}
-
-/// Result of [`adaptive`].
-#[derive(Debug, Clone, PartialEq)]
-pub struct AdaptiveRun {
-    /// Question by question. Their runs include the search.
-    pub estimates: Vec<Estimate>,
-    /// The search.
-    pub search: SearchRun,
-}
-
-/// Searches a proposal, then samples it beside the density. The final sample is independent of the search and its size is
-/// fixed before it, so the estimate is unbiased, and nothing stops it where it looks good.
-///
-/// # Errors
-/// Those of the limit state; [`crate::Error::Usage`] if the density has no valid point.
-pub fn adaptive(
-    nominal: &dyn Density,
-    limit_state: &dyn LimitState,
-    options: &Search,
-    goal: &Goal,
-    seed: u64,
-    level: f64,
-) -> Result<AdaptiveRun> {
-    let run = search(nominal, limit_state, options, seed)?;
-    let draws = goal.draws(&run.questions, seed, level);
-    let proposal = run.proposal_or(nominal)?;
-    let estimates = importance(nominal, &proposal, limit_state, &draws, level)?;
-    let estimates = estimates.into_iter().map(|estimate| estimate.after_search(run.points)).collect();
-    Ok(AdaptiveRun { estimates, search: run })
 }
