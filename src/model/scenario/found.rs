@@ -161,13 +161,18 @@ fn contradictions(scenarios: &[Scenario]) -> Vec<String> {
         Some((such.count() + 1, format!("{words}, the first is scenario {}: {help}", first.id)))
     };
     let of = |found: Option<(usize, String)>| found.map(|(count, text)| format!("{count} {text}"));
-    let changes = scenarios.iter().filter(|s| s.kept && outside_and_inside(s).is_some()).count();
-    let off = note(
-        true,
-        "kept lane changes are never in the ego's lane",
-        "y is the distance from the middle of the ego's lane",
-        &|s| outside_and_inside(s).is_some_and(|(_, inside)| inside.abs() > IN_LANE_SHARE * s.lane_width),
-    );
+    // A lane change may end beyond its lane; most of a category do not.
+    let off = [Category::CutIn, Category::CutOut].map(|category| {
+        let changes = scenarios.iter().filter(|s| s.kept && s.category == category).count();
+        let is_off = |(_, inside): (f64, f64), width_m| inside.abs() > IN_LANE_SHARE * width_m;
+        let found = note(
+            true,
+            "kept lane changes are never in the ego's lane",
+            "y is the distance from the middle of the ego's lane",
+            &|s| s.category == category && outside_and_inside(s).is_some_and(|ends| is_off(ends, s.lane_width)),
+        );
+        of(found.filter(|(count, _)| 2 * count > changes))
+    });
     [
         of(note(
             true,
@@ -181,8 +186,6 @@ fn contradictions(scenarios: &[Scenario]) -> Vec<String> {
             "y is positive on the side that the vehicle comes from or leaves to",
             &|s| outside_and_inside(s).is_some_and(|(out, _)| out < -LATERAL_NOISE_M),
         )),
-        // A lane change may end beyond its lane; most do not.
-        of(off.filter(|(count, _)| 2 * count > changes)),
         of(note(
             false,
             "scenario(s) have a `gap0` that is not `thw0` times `ego.v0`",
@@ -206,6 +209,7 @@ fn contradictions(scenarios: &[Scenario]) -> Vec<String> {
         )),
     ]
     .into_iter()
+    .chain(off)
     .flatten()
     .collect()
 }
