@@ -22,11 +22,10 @@ struct Generation {
 @group(0) @binding(0) var<uniform> generation: Generation;
 @group(0) @binding(1) var<storage, read> recipe: Recipe;
 @group(0) @binding(2) var<storage, read> numbers: array<u32>;
-@group(0) @binding(3) var<storage, read> sobol_table: array<u32>;
-@group(0) @binding(4) var<storage, read> normal_table: array<vec4<f32>>;
-@group(0) @binding(5) var<storage, read_write> cases: array<LaneCase>;
-@group(0) @binding(6) var<storage, read_write> speed_table: array<f32>;
-@group(0) @binding(7) var<storage, read_write> drawn_records: array<DrawnRecord>;
+@group(0) @binding(3) var<storage, read> normal_table: array<vec4<f32>>;
+@group(0) @binding(4) var<storage, read_write> cases: array<LaneCase>;
+@group(0) @binding(5) var<storage, read_write> speed_table: array<f32>;
+@group(0) @binding(6) var<storage, read_write> drawn_records: array<DrawnRecord>;
 
 const WORKGROUP: u32 = 64u;
 

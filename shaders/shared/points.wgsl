@@ -4,8 +4,7 @@
 const BLOCKS: u32 = 4u;
 
 const SOURCE_RANDOM: u32 = 0u;
-const SOURCE_SOBOL: u32 = 1u;
-const SOURCE_GIVEN: u32 = 2u;
+const SOURCE_GIVEN: u32 = 1u;
 
 // SOURCE_…
 override points_source: u32;
@@ -47,19 +46,13 @@ fn candidate(index: vec2<u32>, attempt: u32) -> Drawn {
         }
         return Drawn(given, attempt + 1u, 0u);
     }
-    if points_source == SOURCE_RANDOM {
-        let seed = vec2<u32>(generation.seed_low, generation.seed_high);
-        for (var block = 0u; 4u * block < 2u + recipe_dimensions; block++) {
-            let four = stream_words(seed, generation.purpose, index, attempt * BLOCKS + block);
-            words[4u * block] = four.x;
-            words[4u * block + 1u] = four.y;
-            words[4u * block + 2u] = four.z;
-            words[4u * block + 3u] = four.w;
-        }
-    } else {
-        for (var dimension = 0u; dimension < 2u + recipe_dimensions; dimension++) {
-            words[dimension] = sobol_word(dimension, index.x);
-        }
+    let seed = vec2<u32>(generation.seed_low, generation.seed_high);
+    for (var block = 0u; 4u * block < 2u + recipe_dimensions; block++) {
+        let four = stream_words(seed, generation.purpose, index, attempt * BLOCKS + block);
+        words[4u * block] = four.x;
+        words[4u * block + 1u] = four.y;
+        words[4u * block + 2u] = four.z;
+        words[4u * block + 3u] = four.w;
     }
     let component = choose(words[0], generation.components);
     let mean = generation.first_mean + component * d;

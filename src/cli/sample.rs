@@ -13,7 +13,7 @@ use crate::Result;
 use crate::cli::settings::{EstimatorKind, SampleSettings};
 use crate::engine::Headway;
 use crate::model::driver::ModelId;
-use crate::run::sampling::{SampleHeadways, SampleSource};
+use crate::run::sampling::SampleHeadways;
 use crate::stats::density::DensityModel;
 
 /// How likely does a driver fail?
@@ -87,7 +87,6 @@ impl Sample {
     /// Whether importance sampling answers what crude Monte Carlo would answer at a higher cost.
     pub(super) fn is_refined(&self) -> bool {
         let needs_crude = self.rows.is_some()
-            || self.settings.points == SampleSource::Sobol
             || self.settings.time_limit_s.is_some()
             || self.shards.is_part()
             || self.shards.plan_only

@@ -7,7 +7,7 @@ use super::sample::Sample;
 use crate::cli::settings::{EstimatorKind, IntervalKind};
 use crate::model::driver::ModelId;
 use crate::report::lanes::table_format;
-use crate::run::sampling::{Estimator, SampleHeadways, SampleOptions, SampleSource, read_proposal};
+use crate::run::sampling::{Estimator, SampleHeadways, SampleOptions, read_proposal};
 use crate::stats::density::{DensityModel, Mixture};
 use crate::stats::estimate::{BinomialInterval, Goal, Search, StopRule};
 use crate::support::input_file::canonical;
@@ -44,7 +44,6 @@ impl Sample {
             seed: self.settings.seed,
             level: self.settings.level,
             stop: self.stop(samples),
-            source: self.settings.points,
             ..SampleOptions::new(self.estimator(density)?, samples, headways)
         })
     }
@@ -115,10 +114,8 @@ impl Sample {
     pub(super) fn check(&self) -> Result<()> {
         let settings = &self.settings;
         let is_crude = self.is_crude();
-        let belongs_to_crude =
-            [("--rows", self.rows.is_some()), ("sample.points=sobol", settings.points == SampleSource::Sobol)];
-        if let Some((flag, _)) = belongs_to_crude.iter().find(|(_, given)| *given && !is_crude) {
-            return Err(only_crude(flag));
+        if self.rows.is_some() && !is_crude {
+            return Err(only_crude("--rows"));
         }
         if settings.estimator == EstimatorKind::Is {
             if let Some(samples) = settings.samples.filter(|samples| *samples > MAX_SPLIT) {

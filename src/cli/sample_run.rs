@@ -12,9 +12,7 @@ use crate::engine::{Chunk, CpuBackend, Executor, LanePlan, OpenBackend};
 use crate::report::lanes;
 use crate::report::sampling::SampleReport;
 use crate::run::parts::{EachChunk, Job, PLAN_FILE};
-use crate::run::sampling::{
-    self, EstimateRow, FailingLane, SampleJob, SampleKind, SampleOptions, SampleResult, SampleSource,
-};
+use crate::run::sampling::{self, EstimateRow, FailingLane, SampleJob, SampleKind, SampleOptions, SampleResult};
 use crate::stats::density::read_density;
 use crate::stats::estimate::{Search, StopRule};
 use crate::support::atomic_file::StagedFile;
@@ -138,9 +136,6 @@ impl Sample {
         executor: &Executor,
         configured: &Configured,
     ) -> Result<Output> {
-        if sample.options.source == SampleSource::Sobol {
-            tracing::warn!("Sobol points: the intervals are those of independent draws, so they are conservative");
-        }
         // Rows are written during the run, so a run with rows cannot resume.
         let Some(mut run) = job.open(&self.out, self.shards.shard, self.rows.is_none())? else {
             tracing::info!("this part exists already and is complete");

@@ -115,10 +115,6 @@ impl Canonical {
             PointSource::Random(stream) => {
                 [0, stream.seed, stream.purpose.into()].into_iter().for_each(|word| self.word(word));
             }
-            PointSource::Sobol(sobol) => {
-                self.word(1);
-                self.words(sobol.table().as_flattened());
-            }
             PointSource::Given => self.word(2),
         }
         self.word(points.dimensions as u64);

@@ -131,7 +131,6 @@ impl SampleReport {
             models: &self.options.models,
             headways: &self.headways,
             plan_headways: &self.plan_headways,
-            points: self.options.source.key(),
             samples: self.options.stop.samples,
             seed: self.options.seed,
             plan_sha256: &self.plan_sha256,

@@ -10,7 +10,7 @@ use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::{MODELS, ModelId};
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{
-    Estimator, SampleHeadways, SampleOptions, SampleSource, generator_of, generator_of_points, plan_points,
+    Estimator, SAMPLE_PURPOSE, SampleHeadways, SampleOptions, generator_of, generator_of_points, plan_points,
     plan_samples,
 };
 use lanesweep::run::study::{StudyOptions, plan_study};
@@ -23,9 +23,9 @@ fn density(category: Category, key: &str, with_thw: bool) -> DensityModel {
     fitted(scenarios_of(12), category, key, with_thw)
 }
 
-fn options(samples: u64, source: SampleSource) -> SampleOptions {
+fn options(samples: u64) -> SampleOptions {
     let headways = SampleHeadways::Each(vec![Headway::ThwS(1.4), Headway::ThwS(0.4)]);
-    SampleOptions { seed: 2026, source, ..SampleOptions::new(Estimator::CRUDE, samples, headways) }
+    SampleOptions { seed: 2026, ..SampleOptions::new(Estimator::CRUDE, samples, headways) }
 }
 
 fn outcomes(plan: &LanePlan, backend: &dyn Backend, cuts: &[u64]) -> Vec<[u64; 17]> {
@@ -90,47 +90,42 @@ fn draws_have_the_mean_and_the_spread_of_their_mixture_and_stay_valid() {
     let density = density(Category::CutIn, "2", false);
     let profile = Profile::load("paper").unwrap();
     let mixture = density.kde.mixture().unwrap();
-    for source in [SampleSource::Random, SampleSource::Sobol] {
-        let generator = generator_of(&density.space, &density.kde, &density.sizes, &profile, source, 7).unwrap();
-        let n = 1 << 16;
-        let d = mixture.dimensions();
-        let (mut sum, mut valid) = (vec![0.0; d], 0.0);
-        for index in 0..n {
-            let drawn = generator.draw(index);
-            if drawn.is_void() {
-                continue;
-            }
-            let point: Vec<f64> = drawn.values[..d].iter().map(|&v| f64::from(v)).collect();
-            assert!(density.space.is_valid(&point), "{point:?}");
-            valid += 1.0;
-            sum.iter_mut().zip(&point).for_each(|(s, v)| *s += v);
+    let stream = Stream { seed: 7, purpose: SAMPLE_PURPOSE };
+    let generator = generator_of(&density.space, &density.kde, &density.sizes, &profile, stream).unwrap();
+    let n = 1 << 16;
+    let d = mixture.dimensions();
+    let (mut sum, mut valid) = (vec![0.0; d], 0.0);
+    for index in 0..n {
+        let drawn = generator.draw(index);
+        if drawn.is_void() {
+            continue;
         }
-        // The same by the mixture's own f64 draws.
-        let stream = Stream { seed: 1, purpose: 2 };
-        let draws: Vec<Vec<f64>> = (0..n).map(|index| mixture.draw(&stream, index, 0)).collect();
-        let kept: Vec<&Vec<f64>> = draws.iter().filter(|p| density.space.is_valid(p)).collect();
-        for j in 0..d {
-            let mean = kept.iter().map(|p| p[j]).sum::<f64>() / kept.len() as f64;
-            let spread = (kept.iter().map(|p| (p[j] - mean) * (p[j] - mean)).sum::<f64>() / kept.len() as f64).sqrt();
-            let error = (sum[j] / valid - mean) / (spread / (n as f64).sqrt());
-            assert!(error.abs() < 6.0, "{source:?}, parameter {j}: {error} standard errors off");
-        }
-        let share = kept.len() as f64 / n as f64;
-        if source == SampleSource::Sobol {
-            assert!((valid / n as f64 - share).abs() < 0.01, "invalid Sobol points are void");
-        } else {
-            assert_eq!(valid, n as f64, "an invalid draw is drawn again");
-        }
+        let point: Vec<f64> = drawn.values[..d].iter().map(|&v| f64::from(v)).collect();
+        assert!(density.space.is_valid(&point), "{point:?}");
+        valid += 1.0;
+        sum.iter_mut().zip(&point).for_each(|(s, v)| *s += v);
     }
+    // The same by the mixture's own f64 draws.
+    let stream = Stream { seed: 1, purpose: 2 };
+    let draws: Vec<Vec<f64>> = (0..n).map(|index| mixture.draw(&stream, index, 0)).collect();
+    let kept: Vec<&Vec<f64>> = draws.iter().filter(|p| density.space.is_valid(p)).collect();
+    for j in 0..d {
+        let mean = kept.iter().map(|p| p[j]).sum::<f64>() / kept.len() as f64;
+        let spread = (kept.iter().map(|p| (p[j] - mean) * (p[j] - mean)).sum::<f64>() / kept.len() as f64).sqrt();
+        let error = (sum[j] / valid - mean) / (spread / (n as f64).sqrt());
+        assert!(error.abs() < 6.0, "parameter {j}: {error} standard errors off");
+    }
+    assert_eq!(valid, n as f64, "an invalid draw is drawn again");
 }
 
 #[test]
 fn samples_are_the_same_whatever_the_chunks_threads_and_instructions() {
     let profile = Profile::load("paper").unwrap();
     for id in Parameterization::ALL {
-        for (source, n) in [(SampleSource::Random, 300), (SampleSource::Sobol, 100)] {
+        {
+            let n = 300;
             let density = density(id.category, id.key, false);
-            let plan = plan_samples(&density, &profile, &options(n, source)).unwrap();
+            let plan = plan_samples(&density, &profile, &options(n)).unwrap();
             let whole = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
             assert!(whole == outcomes(&plan, &CpuBackend::scalar(), &[0, 1, 37, n]), "{id:?} scalar, other chunks");
             for instructions in Instructions::available() {
@@ -150,14 +145,14 @@ fn a_device_makes_the_same_lanes_of_the_same_samples() {
     let mut compared = 0;
     for profile in ["paper", "un-r157"].map(|name| Profile::load(name).unwrap()) {
         for id in Parameterization::ALL {
-            for source in [SampleSource::Random, SampleSource::Sobol] {
+            {
                 let n = 400;
                 let density = density(id.category, id.key, false);
-                let plan = plan_samples(&density, &profile, &options(n, source)).unwrap();
+                let plan = plan_samples(&density, &profile, &options(n)).unwrap();
                 let ours = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
                 let theirs = outcomes(&plan, &*backend, &[0, 3, 150, n]);
                 let differing = ours.iter().zip(&theirs).filter(|(a, b)| a != b).count();
-                assert_eq!(differing, 0, "{} {} {source:?}: of {} lanes", profile.name, id.key, ours.len());
+                assert_eq!(differing, 0, "{} {}: of {} lanes", profile.name, id.key, ours.len());
                 compared += ours.len();
             }
         }
@@ -176,14 +171,12 @@ fn a_device_refuses_the_draws_that_the_host_refuses() {
         let id = Parameterization::find(category, key).unwrap();
         let density = DensityModel::fit(id, scenarios_of(12), &provenance(), &fit).unwrap().model;
         let n = 400;
-        for source in [SampleSource::Random, SampleSource::Sobol] {
-            let plan = plan_samples(&density, &profile, &options(n, source)).unwrap();
-            let generator = plan.generator().unwrap();
-            let refused = (0..n).filter(|index| generator.draw(*index).tries > 1).count();
-            assert!(refused > 5, "{key} {source:?}: {refused} refused");
-            let ours = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
-            assert!(ours == outcomes(&plan, &*backend, &[0, n]), "{key} {source:?}");
-        }
+        let plan = plan_samples(&density, &profile, &options(n)).unwrap();
+        let generator = plan.generator().unwrap();
+        let refused = (0..n).filter(|index| generator.draw(*index).tries > 1).count();
+        assert!(refused > 5, "{key}: {refused} refused");
+        let ours = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
+        assert!(ours == outcomes(&plan, &*backend, &[0, n]), "{key}");
     }
 }
 
@@ -196,7 +189,7 @@ fn a_device_draws_headways_and_given_points_alike() {
         [(Category::CutIn, "1"), (Category::CutOut, "b"), (Category::CutOut, "f"), (Category::Lvd, "ii")]
     {
         let density = density(category, key, true);
-        let options = SampleOptions { headways: SampleHeadways::Sampled, ..options(n, SampleSource::Random) };
+        let options = SampleOptions { headways: SampleHeadways::Sampled, ..options(n) };
         let plan = plan_samples(&density, &profile, &options).unwrap();
         let ours = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
         assert!(ours == outcomes(&plan, &*backend, &[0, 77, n]), "{key}");
@@ -212,7 +205,7 @@ fn a_device_draws_headways_and_given_points_alike() {
 fn indices_beyond_32_bits_are_samples_of_their_own() {
     let density = density(Category::CutIn, "1", false);
     let profile = Profile::load("paper").unwrap();
-    let plan = plan_samples(&density, &profile, &options(1 << 34, SampleSource::Random)).unwrap();
+    let plan = plan_samples(&density, &profile, &options(1 << 34)).unwrap();
     let (low, high) = (5_u64, (1_u64 << 32) + 5);
     let run = |backend: &dyn Backend, from: u64| {
         let chunk = backend.prepare(&plan).unwrap().run(from..from + 64, Wanted::Outcomes).unwrap();
@@ -233,7 +226,7 @@ fn indices_beyond_32_bits_are_samples_of_their_own() {
 fn verdicts_of_samples_come_without_their_values_too() {
     let density = density(Category::Lvd, "iv", false);
     let profile = Profile::load("paper").unwrap();
-    let plan = plan_samples(&density, &profile, &options(2000, SampleSource::Random)).unwrap();
+    let plan = plan_samples(&density, &profile, &options(2000)).unwrap();
     let cpu = CpuBackend::lane_arithmetic();
     let mut verdicts = Vec::new();
     Executor::new(&cpu)
@@ -267,7 +260,7 @@ fn failures_of_samples_and_studies_vary_smoothly_with_the_time_step() {
         .map(|(category, key)| density(category, key, false));
     let shares = |dt_s: f64| -> Vec<Vec<f64>> {
         let profile = Profile::load("paper").unwrap().with_dt(dt_s).unwrap();
-        let options = options(4000, SampleSource::Random);
+        let options = options(4000);
         let sampled = densities.iter().map(|density| failures(&plan_samples(density, &profile, &options).unwrap()));
         let studied = Category::ALL.into_iter().map(|category| {
             let study = StudyOptions { categories: vec![category], ..StudyOptions::default() };
@@ -286,13 +279,4 @@ fn failures_of_samples_and_studies_vary_smoothly_with_the_time_step() {
             }
         }
     }
-}
-
-#[test]
-fn a_plan_has_no_more_samples_than_points() {
-    let density = density(Category::CutIn, "1", false);
-    let profile = Profile::load("paper").unwrap();
-    let plan = |samples| plan_samples(&density, &profile, &options(samples, SampleSource::Sobol));
-    assert!(plan(1 << 32).is_ok());
-    assert!(plan((1 << 32) + 1).is_err());
 }

@@ -3,12 +3,13 @@
 use crate::common::mined::{self, provenance, scenarios_of};
 
 use lanesweep::model::profile::Profile;
-use lanesweep::run::sampling::{SampleSource, generator_of};
+use lanesweep::run::sampling::{SAMPLE_PURPOSE, generator_of};
 use lanesweep::scenario::parameterization::{
     Parameterization, ParameterizationOptions, ReducedScenario, Reduction, SeriesScale, SvdBasis, SvdLateral, fit_svd,
 };
 use lanesweep::scenario::{Category, Scenario, Side};
 use lanesweep::stats::density::{DensityModel, FitOptions};
+use lanesweep::stats::random::Stream;
 
 fn kept(category: Category) -> Vec<&'static Scenario> {
     mined::kept(scenarios_of(8), category)
@@ -41,8 +42,8 @@ fn every_draw_starts_and_ends_in_the_lanes_of_its_category_and_drives_at_a_speed
     for id in Parameterization::ALL.into_iter().filter(|id| id.coefficients().is_some()) {
         for svd_lateral in [SvdLateral::Signed, SvdLateral::Mirrored] {
             let density = density(id, options(svd_lateral));
-            let source = SampleSource::Random;
-            let generator = generator_of(&density.space, &density.kde, &density.sizes, &profile, source, 7).unwrap();
+            let stream = Stream { seed: 7, purpose: SAMPLE_PURPOSE };
+            let generator = generator_of(&density.space, &density.kde, &density.sizes, &profile, stream).unwrap();
             for index in 0..2000 {
                 let drawn = generator.draw(index);
                 let point: Vec<f64> =

@@ -6,7 +6,6 @@ use serde::{Deserialize, Serialize};
 use crate::engine::BackendChoice;
 use crate::model::criterion::Criterion;
 use crate::model::driver::Bound;
-use crate::run::sampling::SampleSource;
 use crate::run::score::ScoreOptions;
 use crate::scenario::parameterization::{ParameterizationOptions, SvdLateral};
 use crate::settings;
@@ -138,8 +137,6 @@ settings! {
         pub samples: Option<u64> = None,
         /// Criterion of importance sampling and of a half-width.
         pub criterion: Criterion = Criterion::Collision,
-        /// Kind of points of `mc`.
-        pub points: SampleSource = SampleSource::Random,
         /// Kind of interval of `mc`.
         pub interval: IntervalKind = IntervalKind::Wilson,
         /// Level of the intervals.

@@ -146,8 +146,7 @@ impl Generator {
         let flag = |is_set: bool| f64::from(u8::from(is_set));
         let source = match points.source {
             PointSource::Random(_) => 0.0,
-            PointSource::Sobol(_) => 1.0,
-            PointSource::Given => 2.0,
+            PointSource::Given => 1.0,
         };
         let mut all = vec![
             ("points_source", source),

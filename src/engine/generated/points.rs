@@ -1,7 +1,6 @@
-//! Sample index → point: equal Gaussian kernels drawn with counter-based random words or with scrambled Sobol points, or
-//! a table of given points. Twin: `shaders/shared/points.wgsl`.
+//! Sample index → point: equal Gaussian kernels drawn with counter-based random words, or a table of given points. Twin: `shaders/shared/points.wgsl`.
 
-use crate::random::{SOBOL_POINTS, Sobol, Stream, choose, standard_normal};
+use crate::random::{Stream, choose, standard_normal};
 
 /// Maximum number of parameters of a point.
 pub const MAX_PARAMETERS: usize = 14;
@@ -17,9 +16,6 @@ const BLOCKS: u32 = 4;
 pub enum PointSource {
     /// Philox: independent draws; an invalid point is redrawn.
     Random(Stream),
-    /// Owen-scrambled Sobol points. An invalid point is void, because a redraw would destroy their balance. One
-    /// coordinate selects the component, one is unused, and there is one per parameter.
-    Sobol(Sobol),
     /// Point `i` is mean `i`.
     Given,
 }
@@ -63,7 +59,6 @@ impl Points {
     pub(crate) fn count(&self) -> Option<u64> {
         match &self.source {
             PointSource::Random(_) => None,
-            PointSource::Sobol(_) => Some(SOBOL_POINTS),
             PointSource::Given => Some(u64::from(self.components())),
         }
     }
@@ -91,7 +86,7 @@ impl Points {
         let largest = f64::from(standard_normal(u32::MAX));
         let spread = match self.source {
             PointSource::Given => 0.0,
-            PointSource::Random(_) | PointSource::Sobol(_) => largest * f64::from(self.deviations[parameter]),
+            PointSource::Random(_) => largest * f64::from(self.deviations[parameter]),
         };
         let means = self.means.iter().skip(parameter).step_by(d).map(|mean| f64::from(*mean));
         means.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], mean| {
@@ -103,7 +98,6 @@ impl Points {
     pub fn component(&self, index: u64, tries: u32) -> Option<u32> {
         let word = match &self.source {
             PointSource::Random(stream) => stream.words(index, tries.checked_sub(1)? * BLOCKS)[0],
-            PointSource::Sobol(sobol) => sobol.word(index, 0)?,
             PointSource::Given => return None,
         };
         Some(choose(word, self.components()))
@@ -120,12 +114,6 @@ impl Points {
                 let blocks = (2 + d).div_ceil(4);
                 for (block, four) in words.chunks_exact_mut(4).take(blocks).enumerate() {
                     four.copy_from_slice(&stream.words(index, attempt * BLOCKS + block as u32));
-                }
-            }
-            PointSource::Sobol(sobol) => {
-                for (dimension, word) in words.iter_mut().take(2 + d).enumerate() {
-                    // A plan holds no index beyond the points, and `Sobol` has 2 + d dimensions.
-                    *word = sobol.word(index, dimension as u32).expect("the sequence has this point");
                 }
             }
             PointSource::Given => {
@@ -157,8 +145,6 @@ mod tests {
         let given = points(PointSource::Given);
         let values = (0..given.count().unwrap()).map(|index| given.draw(index, |_| true).values[0]);
         assert_eq!(values.collect::<Vec<_>>(), [1.0, 2.0, 3.0]);
-        let sobol = points(PointSource::Sobol(Sobol::new(7, 3).unwrap()));
-        assert!(!sobol.draw(sobol.count().unwrap() - 1, |_| true).is_void());
         assert_eq!(points(PointSource::Random(Stream { seed: 7, purpose: 0 })).count(), None);
     }
 
@@ -175,12 +161,6 @@ mod tests {
                 assert!(f64::from(*value) >= low - 1e-5 && f64::from(*value) <= high + 1e-5, "{values:?}");
             }
         }
-    }
-
-    #[test]
-    #[should_panic(expected = "the sequence has this point")]
-    fn no_word_stands_in_for_a_sobol_point_that_there_is_not() {
-        points(PointSource::Sobol(Sobol::new(7, 3).unwrap())).draw(SOBOL_POINTS, |_| true);
     }
 
     #[test]

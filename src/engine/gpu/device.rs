@@ -391,7 +391,7 @@ fn entries() -> Vec<wgpu::BindGroupLayoutEntry> {
 /// The bindings of `shaders/generate.wgsl`, in their order: generation, four inputs, cases, instants and
 /// what is counted of samples.
 fn generator_entries() -> Vec<wgpu::BindGroupLayoutEntry> {
-    buffer_entries(4, 3, false)
+    buffer_entries(3, 3, false)
 }
 
 /// The bindings of `shaders/tally.wgsl`, in their order: tally, samples and verdicts, counts and samples left.

@@ -27,7 +27,6 @@ pub(super) struct GeneratorInputs {
     pub generation: wgpu::Buffer,
     pub recipe: wgpu::Buffer,
     pub numbers: wgpu::Buffer,
-    pub sobol: wgpu::Buffer,
     pub normal: wgpu::Buffer,
 }
 
@@ -37,7 +36,6 @@ pub(super) struct GeneratorSetup {
     recipe: Recipe,
     constants: Vec<(&'static str, f64)>,
     numbers: Vec<u32>,
-    sobol: Vec<u32>,
 }
 
 impl GeneratorSetup {
@@ -56,18 +54,13 @@ impl GeneratorSetup {
             stride: generator.case_instants(),
             ..Generation::default()
         };
-        let mut sobol_words = Vec::new();
-        match &points.source {
-            PointSource::Random(stream) => {
-                generation.seed_low = stream.seed as u32;
-                generation.seed_high = (stream.seed >> 32) as u32;
-                generation.purpose = stream.purpose;
-            }
-            PointSource::Sobol(sobol) => sobol_words = sobol.table().concat(),
-            PointSource::Given => (),
+        if let PointSource::Random(stream) = &points.source {
+            generation.seed_low = stream.seed as u32;
+            generation.seed_high = (stream.seed >> 32) as u32;
+            generation.purpose = stream.purpose;
         }
         let (recipe, constants) = (generator.recipe, generator.shader_constants());
-        GeneratorSetup { generation, recipe, constants, numbers, sobol: sobol_words }
+        GeneratorSetup { generation, recipe, constants, numbers }
     }
 
     /// Bytes of one sample: case, what is counted, and instants.
@@ -84,7 +77,6 @@ impl GeneratorSetup {
             generation: device.buffer("generation", size_of::<Generation>() as u64, Use::UNIFORM | Use::COPY_DST),
             recipe: device.upload("recipe", &[self.recipe])?,
             numbers: device.upload("numbers of the density", &self.numbers)?,
-            sobol: device.upload("Sobol directions", &self.sobol)?,
             normal: device.upload("normal deviates", normal_table())?,
         })
     }
@@ -109,16 +101,8 @@ pub(super) fn generate(device: &mut Device, inputs: &mut Inputs, first: u64, cou
     }
     let generation = Generation { index_low: first as u32, index_high: (first >> 32) as u32, count, ..template };
     device.queue.write_buffer(&made.generation, 0, bytemuck::bytes_of(&generation));
-    let buffers = [
-        &made.generation,
-        &made.recipe,
-        &made.numbers,
-        &made.sobol,
-        &made.normal,
-        &inputs.cases,
-        &inputs.speed,
-        &inputs.drawn,
-    ];
+    let buffers =
+        [&made.generation, &made.recipe, &made.numbers, &made.normal, &inputs.cases, &inputs.speed, &inputs.drawn];
     let entries: Vec<wgpu::BindGroupEntry> = buffers
         .iter()
         .enumerate()

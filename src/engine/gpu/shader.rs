@@ -25,13 +25,11 @@ pub const SHARED: [(&str, &str); 13] = [
     ("shared/verdicts.wgsl", include_str!("../../../shaders/shared/verdicts.wgsl")),
 ];
 
-/// Fragments of sampling, twins of `src/stats/random`, for a kernel that declares their tables: `normal_table:
-/// array<vec4<f32>>` ([`normal_table`](crate::random::normal_table)) and `sobol_table: array<u32>`
-/// ([`Sobol::table`](crate::random::Sobol::table)).
-pub const RANDOM: [(&str, &str); 3] = [
+/// Fragments of sampling, twins of `src/stats/random`, for a kernel that declares their table: `normal_table:
+/// array<vec4<f32>>` ([`normal_table`](crate::random::normal_table)).
+pub const RANDOM: [(&str, &str); 2] = [
     ("shared/philox.wgsl", include_str!("../../../shaders/shared/philox.wgsl")),
     ("shared/normal.wgsl", include_str!("../../../shaders/shared/normal.wgsl")),
-    ("shared/sobol.wgsl", include_str!("../../../shaders/shared/sobol.wgsl")),
 ];
 
 /// Entry point of the generator's pipeline.

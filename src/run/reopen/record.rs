@@ -9,7 +9,7 @@ use crate::engine::{ENGINE_VERSION, Headway, LanePlan};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::parts::{PLAN_FILE, RUN_PLAN_FILE, kind_of};
-use crate::run::sampling::{Estimator, SampleHeadways, SampleOptions, SampleSource, plan_samples};
+use crate::run::sampling::{Estimator, SampleHeadways, SampleOptions, plan_samples};
 use crate::run::study::Study;
 use crate::stats::density::{DensityModel, read_density};
 use crate::support::input_file::{MAX_TABLE_BYTES, read_json};
@@ -24,7 +24,6 @@ pub(super) fn sample_of(dir: &Path) -> Result<(LanePlan, DensityModel)> {
         /// Files of earlier versions have no engine number.
         engine: Option<u64>,
         estimator: String,
-        points: String,
         samples: u64,
         seed: u64,
         models: Vec<ModelId>,
@@ -64,7 +63,6 @@ pub(super) fn sample_of(dir: &Path) -> Result<(LanePlan, DensityModel)> {
     };
     let options = SampleOptions {
         seed: run.seed,
-        source: if run.points == "sobol" { SampleSource::Sobol } else { SampleSource::Random },
         models: run.models,
         ..SampleOptions::new(Estimator::CRUDE, run.samples, headways)
     };

@@ -1,8 +1,5 @@
 //! Makes a case generator from a parameter space and a mixture.
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
 use crate::engine::attention_rules;
 use crate::engine::generated::{
     CasePath, ColumnBound, Generator, LateralPath, MAX_BOUNDS, MAX_PARAMETERS, NO_SLOT, PointSource, Points, Recipe,
@@ -10,7 +7,7 @@ use crate::engine::generated::{
 };
 use crate::model::profile::{CutOutEvaluated, CutOutTarget, Profile};
 use crate::model::scalar::Real;
-use crate::random::{Sobol, Stream};
+use crate::random::Stream;
 use crate::scenario::Category;
 use crate::scenario::parameterization::{AfterDuration, ReducedSeries, Sizes, Variable};
 use crate::stats::density::{Kde, ParameterSpace};
@@ -19,45 +16,21 @@ use crate::{Error, Place, Result};
 /// Purpose of the random stream of the samples.
 pub const SAMPLE_PURPOSE: u32 = 0x5341_4d50;
 
-/// Points of crude Monte Carlo.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum SampleSource {
-    /// Independent draws
-    Random,
-    /// Owen-scrambled Sobol points
-    Sobol,
-}
-
-impl SampleSource {
-    /// Name in files: `random`, `sobol`.
-    pub fn key(self) -> &'static str {
-        match self {
-            SampleSource::Random => "random",
-            SampleSource::Sobol => "sobol",
-        }
-    }
-}
-
 /// The generator that draws from the kernels of a density over a parameter space.
 ///
 /// # Errors
-/// [`Error::Usage`] for more than [`MAX_PARAMETERS`] parameters, a profile whose cut-outs begin at the exposure, or
-/// more Sobol dimensions than available; [`Error::Input`] for a cut-out without the size of the vehicle ahead.
+/// [`Error::Usage`] for more than [`MAX_PARAMETERS`] parameters, or a profile whose cut-outs begin at the
+/// exposure; [`Error::Input`] for a cut-out without the size of the vehicle ahead.
 pub fn generator_of(
     space: &ParameterSpace,
     kde: &Kde,
     sizes: &Sizes,
     profile: &Profile,
-    source: SampleSource,
-    seed: u64,
+    stream: Stream,
 ) -> Result<Generator> {
     let dimensions = space.dimensions();
     let points = Points {
-        source: match source {
-            SampleSource::Random => PointSource::Random(Stream { seed, purpose: SAMPLE_PURPOSE }),
-            SampleSource::Sobol => PointSource::Sobol(Sobol::new(seed, 2 + dimensions as u32)?),
-        },
+        source: PointSource::Random(stream),
         dimensions,
         means: kde.points().iter().flatten().map(|&v| rounded(v)).collect(),
         deviations: kde.spread().iter().map(|&v| v as f32).collect(),

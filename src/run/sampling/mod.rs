@@ -24,7 +24,7 @@ pub use cheaper_estimator::Choice;
 pub use crude::{Checkpoint, CheckpointRow, CrudeRun};
 pub use estimate_rows::{EstimateRow, RecordedRatios, Risk, RiskRate};
 pub use failing_lanes::FailingLane;
-pub use generator::{SAMPLE_PURPOSE, SampleSource, generator_of, generator_of_points};
+pub use generator::{SAMPLE_PURPOSE, generator_of, generator_of_points};
 pub use limit_state::{LaneLimitState, limit_state, truncated};
 pub use plan::{plan_points, plan_samples};
 use plan_file::{KIND, SEARCH_FILE};

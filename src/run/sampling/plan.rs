@@ -2,21 +2,21 @@
 
 use std::sync::Arc;
 
-use crate::engine::generated::{Generator, PointSource};
+use crate::engine::generated::Generator;
 use crate::engine::{Block, Headway, LanePlan, Units};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::random::{SOBOL_POINTS, Stream};
+use crate::random::Stream;
 use crate::stats::density::DensityModel;
 use crate::{Error, Place, Result};
 
-use super::generator::{SampleSource, generator_of, generator_of_points};
+use super::generator::{SAMPLE_PURPOSE, generator_of, generator_of_points};
 use super::sample_options::{SampleHeadways, SampleOptions};
 
 /// The plan whose unit `i` is draw `i` of the density.
 ///
 /// # Errors
-/// [`Error::Usage`] without samples, for more than 2⁶³ lanes or more samples than Sobol points, for headways that the
+/// [`Error::Usage`] without samples, for more than 2⁶³ lanes, for headways that the
 /// density does not have, and as [`generator_of`].
 pub fn plan_samples(density: &DensityModel, profile: &Profile, options: &SampleOptions) -> Result<LanePlan> {
     let samples = options.stop.samples;
@@ -24,13 +24,8 @@ pub fn plan_samples(density: &DensityModel, profile: &Profile, options: &SampleO
     if samples == 0 {
         return Err(Error::usage(place(), "0 samples estimate nothing", "give 1000000, for instance"));
     }
-    if options.source == SampleSource::Sobol && samples > SOBOL_POINTS {
-        let problem = format!("{samples} Sobol points are asked for, {SOBOL_POINTS} there are");
-        return Err(Error::usage(place(), problem, "use independent random points beyond"));
-    }
-    let (source, seed) = (options.source, options.seed);
-    let generator = generator_of(&density.space, &density.kde, &density.sizes, profile, source, seed)?;
-    plan(density, profile, generator, samples, &options.models, &options.headways)
+    let stream = Stream { seed: options.seed, purpose: SAMPLE_PURPOSE };
+    plan_draws(density, stream, profile, samples, &options.models, &options.headways)
 }
 
 /// The plan whose unit `i` is draw `i` of the density in a stream.
@@ -45,9 +40,7 @@ pub(super) fn plan_draws(
     models: &[ModelId],
     headways: &SampleHeadways,
 ) -> Result<LanePlan> {
-    let source = SampleSource::Random;
-    let mut generator = generator_of(&density.space, &density.kde, &density.sizes, profile, source, stream.seed)?;
-    generator.points.source = PointSource::Random(stream);
+    let generator = generator_of(&density.space, &density.kde, &density.sizes, profile, stream)?;
     plan(density, profile, generator, draws, models, headways)
 }
 

@@ -2,7 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::generator::SampleSource;
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
@@ -81,8 +80,6 @@ pub struct SampleOptions {
     pub estimator: Estimator,
     /// When to end. Crude Monte Carlo with a rule in addition to the number of samples cannot be split.
     pub stop: StopRule,
-    /// Kind of points (crude).
-    pub source: SampleSource,
     /// Models, in order.
     pub models: Vec<ModelId>,
     /// Headways.
@@ -103,7 +100,6 @@ impl SampleOptions {
         SampleOptions {
             estimator,
             stop: StopRule::samples(samples),
-            source: SampleSource::Random,
             models: ModelId::ALL.to_vec(),
             headways,
             criterion: Criterion::Collision,
