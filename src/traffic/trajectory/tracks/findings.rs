@@ -22,6 +22,8 @@ const MAX_ACROSS: f64 = 0.15;
 const ACROSS_M: f64 = 15.0;
 /// What goes farther back along the road drives backwards, m.
 const MAX_BACKWARD_M: f64 = 5.0;
+/// Offsets from the middle of the lane of so many half widths are those of an edge, which gives 1.
+const MIN_EDGE: f64 = 0.6;
 /// Fewer vehicles prove nothing.
 const MIN_VEHICLES: usize = 5;
 
@@ -138,7 +140,11 @@ impl Understanding {
         if 2 * lanes().filter(|lane| **lane == NO_LANE).count() > lanes().count() {
             self.refuse("vehicles are mostly in no lane: check the axes, and the lanes in the file");
         }
-        doubts.sentences().into_iter().for_each(|text| self.warn(text));
+        // The reader of highD's format says the same, with its line.
+        let kind = |text: &str| text.split(',').next().map(str::to_owned);
+        let is_new = |text: &String| self.findings.iter().all(|known| kind(&known.text) != kind(text));
+        let new: Vec<String> = doubts.sentences().into_iter().filter(is_new).collect();
+        new.into_iter().for_each(|text| self.warn(text));
     }
 
     /// Finds single samples that cannot be, and speeds that do not change.
@@ -198,8 +204,11 @@ impl Understanding {
         }
         if let Some(mismatch) = self.seen.label_mismatch.filter(|mismatch| *mismatch > 0.05) {
             let percent = significant(100.0 * mismatch, 2);
-            let text =
-                format!("{percent} % of the samples are not where the name of their lane says; positions decide");
+            let decides = match self.seen.first_misplaced {
+                Some((vehicle, frame)) => format!("the first is vehicle {vehicle} at frame {frame}; `laneId` decides"),
+                None => "positions decide".to_owned(),
+            };
+            let text = format!("{percent} % of the samples are not where the name of their lane says; {decides}");
             self.find(mismatch > 0.2, text);
         }
     }
@@ -237,14 +246,16 @@ impl Understanding {
                 "{pairs} pairs of vehicles overlap, the first are {first}: check sizes and `reference` (centre, front, rear, corner)"
             ));
         }
-        let (mut by_lane, mut by_class) = (Vec::new(), Vec::new());
-        for at in 0..recording.carriageways.len() {
+        let (mut by_lane, mut by_class, mut shifts) = (Vec::new(), Vec::new(), Vec::new());
+        for (at, of) in recording.carriageways.iter().enumerate() {
             let mut offsets = self.offsets(recording, at);
+            let sign = if of.name == "2" { 1.0 } else { -1.0 };
+            shifts.extend(offsets.iter().map(|(half_m, mean_m, _)| sign * mean_m / half_m));
             by_class.extend(slope_within(&mut offsets, 0.02));
             offsets.iter_mut().for_each(|of| of.2 /= 2);
             by_lane.extend(slope_within(&mut offsets, 0.08));
         }
-        let is_edge = |(slope, error): &(f64, f64)| (0.6..1.6).contains(&slope.abs()) && slope.abs() > 4.0 * error;
+        let is_edge = |(slope, error): &(f64, f64)| (MIN_EDGE..1.6).contains(&slope.abs()) && slope.abs() > 4.0 * error;
         // Lorries may keep to the right in every direction; an edge in the image is on the other side in the other direction.
         let is_turned = matches!(by_lane[..], [(a, _), (b, _)] if a * b < 0.0);
         let found = if is_turned && by_lane.iter().all(is_edge) { by_lane } else { by_class };
@@ -252,6 +263,14 @@ impl Understanding {
             let (slope, error) = (significant(slope.abs(), 2), significant(*error, 1));
             self.refuse(format!(
                 "the wider a vehicle, the farther it is beside the middle of its lane: by {slope} ± {error} m for each metre of half its width, where an edge or a corner of the box gives 1, see `reference`"
+            ));
+        }
+        // Lines that follow from positions are amid them, whatever the point.
+        let shift = median(&mut shifts).abs();
+        if self.seen.lane_sources.is_empty() && shift >= MIN_EDGE && shifts.len() >= MIN_VEHICLES {
+            let shift = significant(shift, 2);
+            self.refuse(format!(
+                "half of the vehicles are at least {shift} half widths beside the middle of their lanes, on one side of the road, so that boxes cross lane lines: y is that of another point of the box"
             ));
         }
         let jumping = recording.tracks.iter().filter(|track| jumps(track, recording.frame_rate_hz)).count();
