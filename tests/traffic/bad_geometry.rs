@@ -50,15 +50,15 @@ fn a_mirrored_axis_and_a_wrong_reference_point_are_refused() {
     let cases: [(&str, Texts, &[&str]); 7] = [
         ("upside down", changed(&texts, "y", |y, _| -y), &["mirrored"]),
         ("upside down, corner", changed(&texts, "y", |y, height| -y - height), &["mirrored"]),
-        (
-            "from the other side",
-            changed(&texts, "y", |y, height| 8.0 + 31.25 - y - height),
-            &["mirrored"],
-        ),
+        ("from the other side", changed(&texts, "y", |y, height| 8.0 + 31.25 - y - height), &["mirrored"]),
         ("centre", y_with(0.5), &["half of the vehicles are at least 1.0 half widths", "cross lane lines"]),
         ("lower edge", y_with(1.0), &["cross lane lines"]),
         ("lateral speed", changed(&texts, "yVelocity", |v, _| -v), &["lateral speed", "mirrored"]),
-        ("a lane beside", changed(&texts, "y", |y, _| y + 3.6), &["100 % of the samples", "vehicle 1 at frame 1", "`laneId`"]),
+        (
+            "a lane beside",
+            changed(&texts, "y", |y, _| y + 3.6),
+            &["100 % of the samples", "vehicle 1 at frame 1", "`laneId`"],
+        ),
     ];
     for (what, texts, says) in cases {
         let error: Error = texts.read_checked(Implausible::Refused).expect_err(what);

@@ -174,7 +174,9 @@ fn positions_in_millimetres_are_read_by_a_preset() {
     );
     fs::write(&preset, own).unwrap();
     let preset = Preset::load(&preset.to_string_lossy()).unwrap();
-    let found = InputFile::Tracks(TrackFile { path, id: "own".to_owned() }, Box::new(preset)).read(Implausible::Refused).unwrap();
+    let found = InputFile::Tracks(TrackFile { path, id: "own".to_owned() }, Box::new(preset))
+        .read(Implausible::Refused)
+        .unwrap();
     let right = read("own.csv", table().text().as_bytes()).unwrap();
     let pairs = found[0].recording.tracks.iter().zip(&right.tracks);
     assert!(pairs.flat_map(|(a, b)| a.s_m.iter().zip(&b.s_m)).all(|(a, b)| (a - b).abs() < 1e-9));

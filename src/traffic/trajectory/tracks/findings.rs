@@ -290,17 +290,22 @@ impl Understanding {
             Some((track.width_m / 2.0, mean_m, 2 * lane + u16::from(track.class == VehicleClass::Truck)))
         };
         let all: Vec<(f64, f64, u16)> = recording.tracks.iter().filter_map(offset).collect();
-        for (is_truck, class) in [(0, "cars"), (1, "lorries")] {
+        let mean = |(is_truck, class): (u16, &str)| {
             let of: Vec<f64> = all.iter().filter(|of| of.2 % 2 == is_truck).map(|of| of.1).collect();
-            if of.len() >= MIN_VEHICLES {
-                let (n, way) = (of.len() as f64, if lanes.name == "2" { "forward" } else { "backward" });
-                let mean_m = of.iter().sum::<f64>() / n;
-                let error_m = libm::sqrt(of.iter().map(|m| (m - mean_m) * (m - mean_m)).sum::<f64>() / (n * (n - 1.0)));
-                self.fact(
-                    "offsets",
-                    format!("{way}: {class} {mean_m:.2} ± {error_m:.2} m to the left of the middle of their lanes"),
-                );
-            }
+            let n = of.len() as f64;
+            let mean_m = of.iter().sum::<f64>() / n;
+            let error_m = libm::sqrt(of.iter().map(|m| (m - mean_m) * (m - mean_m)).sum::<f64>() / (n * (n - 1.0)));
+            (of.len() >= MIN_VEHICLES).then(|| format!("{class} {mean_m:.2} ± {error_m:.2} m"))
+        };
+        let means: Vec<String> = [(0, "cars"), (1, "lorries")].into_iter().filter_map(mean).collect();
+        // Lines that follow from positions lie amid cars and lorries; the difference holds whatever the lines are.
+        let mut by_class: Vec<_> = all.iter().map(|of| (f64::from(of.2 % 2), of.1, of.2 / 2)).collect();
+        let beside = slope_within(&mut by_class, 0.08).map_or(String::new(), |(by_m, error_m)| {
+            format!("; lorries {by_m:.2} ± {error_m:.2} m to the left of the cars of their lane")
+        });
+        if !means.is_empty() {
+            let (way, means) = (if lanes.name == "2" { "forward" } else { "backward" }, means.join(", "));
+            self.fact("offsets", format!("{way}: {means} to the left of the middle of their lanes{beside}"));
         }
         all
     }
