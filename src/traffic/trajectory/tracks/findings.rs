@@ -140,6 +140,11 @@ impl Understanding {
         if 2 * lanes().filter(|lane| **lane == NO_LANE).count() > lanes().count() {
             self.refuse("vehicles are mostly in no lane: check the axes, and the lanes in the file");
         }
+        let mut off = recording.tracks.iter().filter(|track| track.lane.iter().all(|lane| *lane == NO_LANE));
+        if let Some(first) = off.next() {
+            let number = 1 + off.count();
+            self.warn(format!("{number} vehicles are in no lane at any time, the first is vehicle {}", first.id));
+        }
         // The reader of highD's format says the same, with its line.
         let kind = |text: &str| text.split(',').next().map(str::to_owned);
         let is_new = |text: &String| self.findings.iter().all(|known| kind(&known.text) != kind(text));
@@ -315,10 +320,13 @@ impl Understanding {
         let all = recording.tracks.len();
         let slow = |track: &Track| track.v_s_mps.iter().filter(|v| **v < NOISE_MPS).count();
         let is_backward = |of: &Track| of.s_m[of.len() - 1] - of.s_m[0] < -MAX_BACKWARD_M || 20 * slow(of) > of.len();
+        let first = recording.tracks.iter().find(|track| is_backward(track)).map_or(0, |track| track.id);
         recording.tracks.retain(|track| !is_backward(track));
         let backwards = all - recording.tracks.len();
-        let what = "vehicles drive backwards (by more than 5 m, or faster than 0.5 m/s) and are left out: check `direction` and the signs of the speeds";
-        self.find_of(backwards as u64, 5 * backwards > all, what);
+        let what = format!(
+            "vehicles drive backwards (by more than 5 m, or faster than 0.5 m/s) and are left out, the first is vehicle {first}: check `direction` and the signs of the speeds"
+        );
+        self.find_of(backwards as u64, 5 * backwards > all, &what);
     }
 
     /// Sets speeds below 0 to 0: they are noise of vehicles that do not drive backwards.
