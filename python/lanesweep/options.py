@@ -73,6 +73,8 @@ class Data(Plausibility, total=False):
     ----------
     scenarios : path or table
         Scenario file (.jsonl, .parquet, .csv) or a table of pandas, Polars or pyarrow with its columns, instead of recordings.
+    filter : bool
+        Keep only scenarios of the file that pass the filters of mining; by default they are kept as given.
     preset : str or path
         Format of the recordings: ``"exid"``, ``"sumo-fcd"``, … or a TOML file; by default the names of the columns tell it.
     synth_recordings : int
@@ -82,6 +84,7 @@ class Data(Plausibility, total=False):
     """
 
     scenarios: Path
+    filter: bool
     preset: Path
     synth_recordings: Int
 

@@ -203,7 +203,8 @@ pub(super) fn choice<T: ValueEnum>(value: &Value) -> std::result::Result<T, Stri
 }
 
 /// An argument that means nothing without another one, by verb.
-pub(super) const NEEDS: [(&[&str], &str, &str); 13] = [
+pub(super) const NEEDS: [(&[&str], &str, &str); 14] = [
+    (&["study", "fit", "verify"], "filter", "scenarios"),
     (&["study", "fit", "verify", "mine"], "preset", "recordings"),
     (&["check"], "scenario", "file"),
     (&["check"], "row", "file"),

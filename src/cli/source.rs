@@ -37,7 +37,8 @@ pub(super) fn load(source: &Source, configured: &Configured, implausible: Implau
             if name == "generic" { ", which takes positions for centres and numbers for SI units" } else { "" };
         tracing::info!("read by preset {name}{assumed}; `lanesweep tracks` says how");
     }
-    tracing::info!("{}", counts_text(&counts(&collection.scenarios)));
+    let kept = if matches!(source, Source::Scenarios { filter: false, .. }) { "kept as given" } else { "kept" };
+    tracing::info!("{}", counts_text(&counts(&collection.scenarios)).replacen("kept", kept, 1));
     Ok(collection)
 }
 
@@ -99,18 +100,21 @@ pub(super) struct SourceFlags {
     /// Scenario file (.jsonl, .parquet, .csv) instead of recordings
     #[arg(long, value_name = "FILE", help_heading = "Data")]
     pub scenarios: Option<PathBuf>,
+    /// Keep only scenarios of the file that pass the filters of mining [default: kept as given]
+    #[arg(long, requires = "scenarios", help_heading = "Data", hide_short_help = true)]
+    filter: bool,
     #[command(flatten)]
     plausibility: PlausibilityFlag,
 }
 
-from_arguments!(SourceFlags { recordings, scenarios } groups { preset, plausibility });
+from_arguments!(SourceFlags { recordings, scenarios, filter } groups { preset, plausibility });
 
 impl SourceFlags {
     /// The named source; the generator if none is named.
     pub(super) fn source(&self, configured: &Configured) -> Source {
         match (&self.recordings, &self.scenarios) {
             (Some(dir), _) => Source::Recordings { path: dir.clone(), preset: self.preset.preset.clone() },
-            (None, Some(path)) => Source::Scenarios(path.clone()),
+            (None, Some(path)) => Source::Scenarios { path: path.clone(), filter: self.filter },
             (None, None) => Source::Generated(configured.settings.generator.clone()),
         }
     }

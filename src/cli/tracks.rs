@@ -22,7 +22,7 @@ use crate::traffic::Source;
 use crate::traffic::mining::{counts, mine, noise_notes};
 use crate::traffic::trajectory::generator::generate_one;
 use crate::traffic::trajectory::highd::{self, SYNTHETIC_MARKER};
-use crate::traffic::trajectory::tracks::{LoadedTracks, SYNTHETIC, Understanding, read_tracks};
+use crate::traffic::trajectory::tracks::{LoadedTracks, SYNTHETIC};
 use crate::traffic::trajectory::{InputFile, Inputs, Loaded, NO_LANE, Recording, Track, VehicleClass};
 use crate::{Error, Place, Result};
 
@@ -145,10 +145,11 @@ impl Tracks {
     }
 
     fn of_file(&self, file: &InputFile, configured: &Configured) -> Result<Vec<(TrackReport, Recording)>> {
-        let (name, preset, read) = match file {
-            InputFile::Highd(files) => (&files.tracks, "highd", vec![Understanding::of_loaded(highd::read(files)?)]),
-            InputFile::Tracks(file, preset) => (&file.path, preset.name.as_str(), read_tracks(file, preset)?),
+        let (name, preset) = match file {
+            InputFile::Highd(files) => (&files.tracks, "highd"),
+            InputFile::Tracks(file, preset) => (&file.path, preset.name.as_str()),
         };
+        let read = file.understand(Implausible::Accepted)?;
         let report = |LoadedTracks { loaded, mut understanding }| {
             let (Loaded { recording, vehicle_names, .. }, options) = (loaded, &configured.settings.mining);
             // As in runs: what noise may do to the scenarios, and those that are left out.

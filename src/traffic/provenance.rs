@@ -7,7 +7,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
-use super::mining::{Collection, MiningOptions, RecordingSummary, leave_out_copies, mine_generated, mine_inputs};
+use super::mining::{
+    Collection, MiningOptions, RecordingSummary, filter_given, leave_out_copies, mine_generated, mine_inputs,
+};
 use super::trajectory::Inputs;
 use super::trajectory::generator::GeneratorOptions;
 use super::trajectory::highd::made_up;
@@ -28,7 +30,12 @@ pub enum Source {
         preset: Option<String>,
     },
     /// A scenario file.
-    Scenarios(PathBuf),
+    Scenarios {
+        /// The file.
+        path: PathBuf,
+        /// The filters of mining decide which scenarios are kept; else they are kept as given.
+        filter: bool,
+    },
     /// Recordings that the program generates.
     Generated(GeneratorOptions),
 }
@@ -40,7 +47,9 @@ impl Source {
             Source::Recordings { path, .. } => {
                 made_up(path).unwrap_or_else(|| format!("recordings in {}", path.display()))
             }
-            Source::Scenarios(path) => format!("scenarios of {}", path.display()),
+            Source::Scenarios { path, filter } => {
+                format!("scenarios of {}{}", path.display(), if *filter { ", filtered" } else { "" })
+            }
             Source::Generated(options) => format!(
                 "SYNTHETIC DATA: {} generated recordings of {} s, seed {}, event rates multiplied by {}",
                 options.recordings, options.duration_s, options.seed, options.event_rate_factor
@@ -52,7 +61,7 @@ impl Source {
     /// Number of recordings to be mined.
     pub fn recordings(&self) -> u64 {
         match self {
-            Source::Scenarios(_) => 0,
+            Source::Scenarios { .. } => 0,
             Source::Recordings { path, preset } => {
                 Inputs::of(path, preset.as_deref()).map_or(0, |inputs| inputs.count() as u64)
             }
@@ -72,8 +81,9 @@ impl Source {
         done: impl Fn() -> Result<()> + Sync,
     ) -> Result<Collection> {
         let mut collection = match self {
-            Source::Scenarios(path) => {
-                let ScenarioFile { scenarios, problems, notes } = read_scenario_file(path, implausible)?;
+            Source::Scenarios { path, filter } => {
+                let ScenarioFile { mut scenarios, problems, mut notes } = read_scenario_file(path, implausible)?;
+                notes.extend(filter_given(&mut scenarios, mining, *filter));
                 let synthetic = scenarios.iter().any(|scenario| scenario.synthetic);
                 let read = Collection { scenarios, problems, notes, synthetic, ..Collection::default() };
                 read.with_record_of(path)?
@@ -99,7 +109,7 @@ impl Source {
             scenarios_sha256: self.scenarios_sha256(collection)?,
             driven: collection.driven(),
         };
-        if let Source::Scenarios(path) = self
+        if let Source::Scenarios { path, .. } = self
             && let Some((beside, _)) = DataProvenance::read_beside(path, &provenance.scenarios_sha256)?
         {
             provenance.driven = beside.driven;
@@ -117,7 +127,7 @@ impl Source {
     /// # Errors
     /// [`Error::Io`](crate::support::error::Error::Io).
     pub fn scenarios_sha256(&self, collection: &Collection) -> Result<String> {
-        if let Source::Scenarios(path) = self {
+        if let Source::Scenarios { path, .. } = self {
             return input_file::sha256(path);
         }
         let mut hash = Hashing(Sha256::new());

@@ -8,7 +8,7 @@ use std::path::Path;
 use lanesweep::Result;
 use lanesweep::support::plausibility::Implausible;
 use lanesweep::traffic::trajectory::highd::{self, HighdFiles};
-use lanesweep::traffic::trajectory::{Carriageway, Loaded, Recording, Track, VehicleClass};
+use lanesweep::traffic::trajectory::{Carriageway, InputFile, Loaded, Recording, Track, VehicleClass};
 
 /// A vehicle at constant speed in the middle of a lane, at 25 samples per second.
 pub fn cruising(
@@ -104,7 +104,7 @@ fn read_checked(contents: [&[u8]; 3], implausible: Implausible) -> Result<Loaded
     for (path, content) in [&files.tracks, &files.tracks_meta, &files.recording_meta].into_iter().zip(contents) {
         fs::write(path, content).unwrap();
     }
-    highd::read_checked(&files, implausible)
+    InputFile::Highd(files).read(implausible).map(|mut all| all.remove(0))
 }
 
 /// The table with one field replaced; lines are counted from 1 and include the header.

@@ -207,7 +207,8 @@ fn small_speeds_backwards_are_noise_that_is_counted_and_larger_ones_an_error() {
 #[test]
 fn a_speed_that_contradicts_the_positions_and_a_jump_are_refused_unless_accepted() {
     let mut recording = small::recording();
-    recording.tracks = vec![small::cruising(1, 1, 0, 1, 60, &recording)];
+    recording.tracks = vec![small::cruising(1, 1, 0, 1, 300, &recording)];
+    recording.tracks[0].v_s_mps[0] += 0.1;
     highd::quantize(&mut recording).unwrap();
     let spoilt: [fn(&mut Track); 2] =
         [|track| track.v_s_mps[30] = 0.0, |track| track.s_m[30..].iter_mut().for_each(|s| *s += 8.0)];
@@ -216,7 +217,7 @@ fn a_speed_that_contradicts_the_positions_and_a_jump_are_refused_unless_accepted
         spoil(&mut wrong.tracks[0]);
         let texts = Texts::of(&wrong);
         let error = texts.read_checked(Implausible::Refused).unwrap_err();
-        assert_says(&error, &["01_tracks.csv", "`xVelocity`", "vehicle 1 at frame", "its speed is", "but it moves by"]);
+        assert_says(&error, &["01_tracks.csv", "vehicle 1 at frame", "its speed is", "but it moves by"]);
         let accepted = texts.read().unwrap();
         assert!(accepted.notes.iter().any(|note| note.contains("its speed is")), "{:?}", accepted.notes);
     }

@@ -7,7 +7,7 @@ use std::path::Path;
 use lanesweep::support::plausibility::Implausible;
 use lanesweep::traffic::trajectory::highd;
 use lanesweep::traffic::trajectory::tracks::{self, Preset, TrackFile};
-use lanesweep::traffic::trajectory::{Inputs, Recording};
+use lanesweep::traffic::trajectory::{InputFile, Inputs, Recording};
 
 use crate::common::exid::Plain;
 use crate::tracks::generated;
@@ -174,7 +174,9 @@ fn positions_in_millimetres_are_read_by_a_preset() {
     );
     fs::write(&preset, own).unwrap();
     let preset = Preset::load(&preset.to_string_lossy()).unwrap();
-    let found = tracks::read_usable(&TrackFile { path, id: "own".to_owned() }, &preset, Implausible::Refused).unwrap();
+    let found = InputFile::Tracks(TrackFile { path, id: "own".to_owned() }, Box::new(preset))
+        .read(Implausible::Refused)
+        .unwrap();
     let right = read("own.csv", table().text().as_bytes()).unwrap();
     let pairs = found[0].recording.tracks.iter().zip(&right.tracks);
     assert!(pairs.flat_map(|(a, b)| a.s_m.iter().zip(&b.s_m)).all(|(a, b)| (a - b).abs() < 1e-9));
@@ -199,7 +201,7 @@ fn geographic_coordinates_are_named_as_such() {
     let columns = "vehicle = \"track_id\"\ntime = \"t\"\nx = \"longitude\"\ny = \"Latitude\"\n";
     fs::write(&preset, format!("name = \"own\"\n[columns]\n{columns}")).unwrap();
     let preset = Preset::load(&preset.to_string_lossy()).unwrap();
-    let read = tracks::read_usable(&TrackFile { path, id: "own".to_owned() }, &preset, Implausible::Refused);
+    let read = InputFile::Tracks(TrackFile { path, id: "own".to_owned() }, Box::new(preset)).read(Implausible::Refused);
     assert!(read.is_err(), "{read:?}");
 }
 

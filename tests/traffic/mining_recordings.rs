@@ -79,7 +79,9 @@ fn sumo_counts_equal_those_of_a_second_implementation() {
         let counts = all.iter().map(|m| count(&m.scenarios, category));
         counts.fold((0, 0), |sum, c| (sum.0 + c.found, sum.1 + c.kept))
     };
-    // Theirs are 26 and 249: in 04, vehicle 81 changes lanes beside vehicle 45 (gap -4.4 m), so neither leads the other then.
+    // Theirs are 26 and 249, because there the vehicle whose middle is ahead leads. In 04, vehicle 81 comes into the lane beside
+    // vehicle 45 and stays beside it (gap -4.4 m) from frame 1014 to 1105. So it cuts in ahead of nobody, leads 45 from frame 1106
+    // on (the same deceleration, found later), and 45, whose middle is ahead from 1281 on, does not lead 81. None of these is kept.
     assert_eq!(found_and_kept(Category::CutIn), (25, 3));
     assert_eq!(found_and_kept(Category::CutOut), (34, 9));
     assert_eq!(found_and_kept(Category::Lvd), (248, 43));

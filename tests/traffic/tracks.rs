@@ -8,6 +8,7 @@ use lanesweep::scenario::{Category, Scenario};
 use lanesweep::support::plausibility::Implausible;
 use lanesweep::traffic::mining::{MiningOptions, mine};
 use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
+use lanesweep::traffic::trajectory::highd;
 use lanesweep::traffic::trajectory::tracks::{
     self, HeadingOrigin, LoadedTracks, Preset, Reference, RoadSource, Role, Side, TrackFile, Understanding,
 };
@@ -230,6 +231,52 @@ fn wrong_units_axes_and_reference_points_are_found() {
     one_way.map("y", |v, _| -v);
     let about = understood(&one_way, &|_| ()).unwrap();
     assert!(about.findings.iter().any(|finding| finding.text.contains("mirrored")), "{:?}", about.findings);
+}
+
+/// What is understood of one recording as a folder in highD's format, and as a table.
+fn by_both_readers(recording: &Recording) -> [Understanding; 2] {
+    let dir = tempfile::tempdir().unwrap();
+    let (folder, table) = (dir.path().join("highd"), dir.path().join("own.csv"));
+    std::fs::create_dir(&folder).unwrap();
+    highd::write(&folder, recording).unwrap();
+    std::fs::write(&table, Plain::of(recording, 1).text()).unwrap();
+    [folder, table].map(|path| {
+        let (files, _) = Inputs::of(&path, None).unwrap().files();
+        files[0].understand(Implausible::Accepted).unwrap().remove(0).understanding
+    })
+}
+
+#[test]
+fn lorries_beside_the_middle_of_their_lanes_are_no_edge_for_either_reader() {
+    let plain = generated();
+    let moved = |by_m: &dyn Fn(&Track) -> f64| {
+        let mut recording = plain.clone();
+        for track in &mut recording.tracks {
+            let by_m = by_m(track);
+            track.d_m.iter_mut().for_each(|d_m| *d_m += by_m);
+        }
+        highd::quantize(&mut recording).unwrap();
+        by_both_readers(&recording)
+    };
+    let is_forward = |track: &Track| plain.carriageways[track.carriageway].name == "2";
+    // Lorries keep 0.24 m to the right in one direction.
+    let is_such = |track: &Track| track.class == VehicleClass::Truck && is_forward(track);
+    for about in moved(&|track| if is_such(track) { -0.24 } else { 0.0 }) {
+        assert!(about.is_usable(), "{:?}", about.findings);
+        for (way, expected) in [("forward: ", -0.24), ("backward: ", 0.0)] {
+            let text = about.facts.iter().find(|(name, text)| *name == "offsets" && text.starts_with(way)).unwrap();
+            let (mean, error) = text.1.split_once("; lorries ").unwrap().1.split_once(" ± ").unwrap();
+            let [mean, error] = [mean, error.split(' ').next().unwrap()].map(|number| number.parse::<f64>().unwrap());
+            assert!((mean - expected).abs() < 3.0 * error && error < 0.05, "{text:?}");
+        }
+    }
+    // The upper edge of the box in the image.
+    let sign = |track: &Track| if is_forward(track) { 1.0 } else { -1.0 };
+    for about in moved(&|track| sign(track) * track.width_m / 2.0) {
+        assert!(!about.is_usable() && says(&about, "an edge or a corner of the box gives 1"), "{:?}", about.findings);
+    }
+    let [folder, table] = moved(&|_| 0.0).map(|about| about.findings);
+    assert_eq!(folder, table);
 }
 
 #[test]

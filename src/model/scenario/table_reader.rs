@@ -24,18 +24,21 @@ use crate::support::table::{Named, Resolved, Row, TableFormat, TableReader, reso
 pub(super) fn read(path: &Path, format: TableFormat, implausible: Implausible) -> Result<ScenarioFile> {
     let table = TableReader::open(path, format).map_err(|error| of_unreadable_tracks(path, error))?;
     refuse_tracks(table.columns(), table.header())?;
-    let (leaves, time) = (leaves(), [Named { name: "time".to_owned(), unit: "s", needs_unit: false }]);
+    let leaves = leaves();
     let names = names(&leaves);
     let known: Vec<Named> = names.iter().map(|(named, ..)| named.clone()).collect();
     let is = |column: &String, field: &str| match resolve(column, &known) {
         Resolved::Field(at, _) => leaves[names[at].1].flat == field,
         _ => false,
     };
-    let has_time = table.columns().iter().any(|column| matches!(resolve(column, &time), Resolved::Field(..)));
     let has_series = table.columns().iter().any(|column| is(column, "target_v") || is(column, "target_y"));
+    // A case has no series, and `t` is no time of it.
+    let time = ["time", "t"].map(|name| Named { name: name.to_owned(), unit: "s", needs_unit: false });
+    let time = &time[..if has_series { 2 } else { 1 }];
+    let has_time = table.columns().iter().any(|column| matches!(resolve(column, time), Resolved::Field(..)));
     let mut reader = if has_time {
         let mut known = known;
-        known.extend(time);
+        known.extend(time.iter().cloned());
         Reader::new(table, leaves, &known, &names, implausible)?
     } else if has_series {
         Reader::new(table, leaves, &known, &names, implausible)?

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::miner::{CategoryCount, Mined, mine};
 use super::noise::noise_notes;
 use super::options::MiningOptions;
+use super::{cut_in, cut_out, lvd};
 use crate::scenario::{Category, Scenario, ScenarioFile, mined_id, usable};
 use crate::support::plausibility::Implausible;
 use crate::support::readable;
@@ -112,6 +113,30 @@ pub fn counts_text(counts: &[CategoryCount]) -> String {
         format!("{} of {} {}s", readable::count(count.kept), readable::count(count.found), category.label())
     };
     format!("kept: {}", Category::ALL.into_iter().zip(counts).map(part).collect::<Vec<_>>().join(", "))
+}
+
+/// Applies the filters of mining to scenarios of a file or table, which are kept as given; or says what they would keep.
+pub(in crate::traffic) fn filter_given(
+    scenarios: &mut [Scenario],
+    options: &MiningOptions,
+    applies: bool,
+) -> Option<String> {
+    let verdict = |of: &Scenario| match of.category {
+        Category::CutIn => cut_in::verdict(of, &options.cut_in),
+        Category::CutOut => cut_out::verdict(of, &options.cut_out),
+        Category::Lvd => lvd::verdict(of, &options.lvd),
+    };
+    let verdicts: Vec<(bool, String)> = scenarios.iter().map(verdict).collect();
+    let given: Vec<bool> = scenarios.iter().map(|of| of.kept).collect();
+    scenarios.iter_mut().zip(&verdicts).for_each(|(of, (kept, _))| of.kept = *kept);
+    let text = counts_text(&counts(scenarios));
+    if applies {
+        scenarios.iter_mut().zip(verdicts).for_each(|(of, (_, reason))| of.reason = reason);
+        return None;
+    }
+    scenarios.iter_mut().zip(&given).for_each(|(of, kept)| of.kept = *kept);
+    let is_other = given.iter().zip(&verdicts).any(|(given, (kept, _))| given != kept);
+    is_other.then(|| format!("scenarios are kept as given; by the filters (option `filter`) {text}"))
 }
 
 /// Names of vehicles that are longer have their number in ids.

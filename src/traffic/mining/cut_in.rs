@@ -28,10 +28,11 @@ pub(super) fn scenario(set: &DataSet, target_index: usize, matched: &Match, stre
 }
 
 /// The filters of the paper at t = 0: the target is slower than the ego and its headway is short.
-fn verdict(scenario: &Scenario, options: &CutInOptions) -> (bool, String) {
+pub(super) fn verdict(scenario: &Scenario, options: &CutInOptions) -> (bool, String) {
     let (v_target, v_ego) = (scenario.target.v[0], scenario.ego.v0);
     let slower = v_target < options.max_speed_share * v_ego - TOLERANCE;
-    let near = scenario.thw0.is_some_and(|thw| thw < options.max_thw_s - TOLERANCE);
+    let thw = scenario.thw0.or_else(|| Some(scenario.start_gap_m().ok()? / v_ego));
+    let near = thw.is_some_and(|thw| thw < options.max_thw_s - TOLERANCE);
     let mut reasons = Vec::new();
     if !slower {
         reasons.push(format!("v_c >= {} v_e", options.max_speed_share));

@@ -56,8 +56,9 @@ fn uncovered<'a>(found: &FoundScenario<'a>) -> Result<&'a Track, &'static str> {
 }
 
 /// The filter of the paper, at t = 0.
-fn verdict(scenario: &Scenario, options: &CutOutOptions) -> (bool, String) {
-    let slower = scenario.lead.as_ref().is_some_and(|lead| lead.v[0] < scenario.ego.v0 - TOLERANCE);
+pub(super) fn verdict(scenario: &Scenario, options: &CutOutOptions) -> (bool, String) {
+    let Some(lead) = &scenario.lead else { return (false, scenario.reason.clone()) };
+    let slower = lead.v[0] < scenario.ego.v0 - TOLERANCE;
     match (slower, options.require_slower_lead) {
         (true, _) => (true, "lead slower than ego".to_owned()),
         (false, false) => (true, "lead stays ahead".to_owned()),

@@ -43,9 +43,11 @@ pub(super) fn scenario(set: &DataSet, target_index: usize, matched: &Match, firs
 }
 
 /// The filter of the paper, over the trimmed interval.
-fn verdict(scenario: &Scenario, options: &LvdOptions) -> (bool, String) {
+pub(super) fn verdict(scenario: &Scenario, options: &LvdOptions) -> (bool, String) {
     let limit = options.min_peak_deceleration_mps2;
-    match scenario.peak_decel.is_some_and(|peak| peak > limit + TOLERANCE) {
+    let of_speeds =
+        || scenario.target.v.windows(2).map(|v| (v[0] - v[1]) * scenario.fps).fold(f64::NEG_INFINITY, f64::max);
+    match scenario.peak_decel.unwrap_or_else(of_speeds) > limit + TOLERANCE {
         true => (true, format!("peak deceleration > {limit}")),
         false => (false, format!("peak deceleration <= {limit}")),
     }

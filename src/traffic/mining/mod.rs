@@ -27,6 +27,7 @@ mod noise;
 mod options;
 pub mod tags;
 
+pub(super) use collection::filter_given;
 pub use collection::{
     Collection, RecordingSummary, count, counts, counts_text, mine_folder, mine_generated, mine_inputs,
 };

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::highd::{self, HighdFiles};
 use super::recording::Loaded;
-use super::tracks::{self, HIGHD, Preset, TrackFile};
+use super::tracks::{self, HIGHD, LoadedTracks, Preset, TrackFile, Understanding};
 use crate::support::atomic_file::folder_of;
 use crate::support::files::file_name;
 use crate::support::input_file::unpacked;
@@ -130,15 +130,41 @@ impl Inputs {
 }
 
 impl InputFile {
-    /// Reads the recordings.
+    /// Reads the recordings. Contradictions are in their findings.
     ///
     /// # Errors
-    /// As [`highd::read_checked`] and [`tracks::read_usable`].
-    pub fn read(&self, implausible: Implausible) -> Result<Vec<Loaded>> {
+    /// As [`highd::read_checked`] and [`tracks::read_tracks`].
+    pub fn understand(&self, implausible: Implausible) -> Result<Vec<LoadedTracks>> {
         match self {
-            InputFile::Highd(files) => highd::read_checked(files, implausible).map(|loaded| vec![loaded]),
-            InputFile::Tracks(file, preset) => tracks::read_usable(file, preset, implausible),
+            InputFile::Highd(files) => {
+                let loaded = highd::read_checked(files, implausible)?;
+                Ok(vec![Understanding::of_highd(loaded, &Place::file(&files.tracks))?])
+            }
+            InputFile::Tracks(file, preset) => tracks::read_tracks(file, preset),
         }
+    }
+
+    /// Reads the recordings for runs that use them: minor findings become notes.
+    ///
+    /// # Errors
+    /// As [`InputFile::understand`]; [`Error::Input`] for a grave finding, unless implausible input is accepted.
+    pub fn read(&self, implausible: Implausible) -> Result<Vec<Loaded>> {
+        let mut usable = Vec::new();
+        for LoadedTracks { mut loaded, understanding } in self.understand(implausible)? {
+            if let Some(grave) = understanding.findings.iter().find(|finding| finding.is_grave)
+                && implausible == Implausible::Refused
+            {
+                let place = Place::file(&self.paths()[0]).of(format!("recording {}", loaded.recording.id));
+                let format = if matches!(self, InputFile::Highd(_)) { HIGHD_HELP } else { "" };
+                let help = format!(
+                    "`lanesweep tracks` shows all; option `accept_implausible` uses the tracks as they are{format}"
+                );
+                return Err(Error::input(place, grave.text.clone(), help));
+            }
+            loaded.notes.extend(understanding.findings.into_iter().map(|finding| finding.text));
+            usable.push(loaded);
+        }
+        Ok(usable)
     }
 
     /// The files that are read.
@@ -154,6 +180,9 @@ impl InputFile {
 
 /// A table with fewer columns holds no tracks: vehicle, time, x and y.
 const MIN_COLUMNS: usize = 4;
+/// What to look at in highD's format, which has no preset.
+const HIGHD_HELP: &str = "; look at y (it points down; x and y are the left and upper edge of the box in the image), at the lane \
+                          markings, `laneId` and the sizes";
 /// Ending of the tracks in highD's format.
 const HIGHD_ENDING: &str = highd::SUFFIXES[0];
 /// Files that a message lists.

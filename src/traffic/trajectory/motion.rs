@@ -24,8 +24,6 @@ pub(super) struct Impossible {
     pub vehicles: usize,
     /// The first of them, and its frame.
     pub first: (u32, i64),
-    /// Its speed contradicts its positions; else its acceleration is beyond what is physical.
-    pub is_speed: bool,
     /// What cannot be.
     pub problem: String,
 }
@@ -40,13 +38,12 @@ pub(super) fn impossible(recording: &Recording) -> Option<Impossible> {
         value.abs() <= OVER_NOISE * noise_mps2
     };
     let of_track = |track: &Track| {
-        let speed = contradicting_speed(track, rate_hz).map(|(k, problem)| (k, true, problem));
-        speed.or_else(|| unphysical_acceleration(track, rate_hz, is_noise).map(|(k, problem)| (k, false, problem)))
+        contradicting_speed(track, rate_hz).or_else(|| unphysical_acceleration(track, rate_hz, is_noise))
     };
     let mut found = recording.tracks.iter().filter_map(|track| Some((track, of_track(track)?)));
-    let (track, (k, is_speed, problem)) = found.next()?;
+    let (track, (k, problem)) = found.next()?;
     let first = (track.id, track.first_frame + k as i64);
-    Some(Impossible { vehicles: 1 + found.count(), first, is_speed, problem })
+    Some(Impossible { vehicles: 1 + found.count(), first, problem })
 }
 
 fn contradicting_speed(track: &Track, rate_hz: f64) -> Option<(usize, String)> {

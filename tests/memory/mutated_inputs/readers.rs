@@ -16,8 +16,8 @@ use lanesweep::stats::density::{DensityModel, Exposure, read_density};
 use lanesweep::stats::random::Stream;
 use lanesweep::support::plausibility::Implausible;
 use lanesweep::traffic::mining::{MiningOptions, mine, mine_folder};
-use lanesweep::traffic::trajectory::tracks::{Preset, TrackFile, read_usable};
-use lanesweep::traffic::trajectory::{Inputs, Loaded};
+use lanesweep::traffic::trajectory::tracks::{Preset, TrackFile};
+use lanesweep::traffic::trajectory::{InputFile, Inputs, Loaded};
 use lanesweep::{Error, Place, Result};
 
 use super::seeds::Seeds;
@@ -85,7 +85,8 @@ fn preset(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
     let table = file(&seeds.files["track table"][0], dir, "own.csv");
     let [meta, rate] = [file(b"id,l\n1,4.5\n", dir, "own_meta.csv"), file(b"fps\n10\n", dir, "own_rec.csv")];
     let preset = Preset::load(&path.to_string_lossy())?;
-    let read = read_usable(&TrackFile { path: table.clone(), id: "own".to_owned() }, &preset, Implausible::Accepted);
+    let own = TrackFile { path: table.clone(), id: "own".to_owned() };
+    let read = InputFile::Tracks(own, Box::new(preset)).read(Implausible::Accepted);
     removed(&[meta, rate, table]);
     read.map(drop)
 }

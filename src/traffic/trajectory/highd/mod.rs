@@ -6,7 +6,6 @@
 
 mod format;
 mod frame;
-mod geometry;
 mod inventory;
 mod meta;
 mod neighbours;

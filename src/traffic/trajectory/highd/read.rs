@@ -4,16 +4,14 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::format::{FRAME_LIMIT, TRACKS_HEADER, csv_format};
-use super::geometry;
 use super::inventory::{HighdFiles, made_up};
 use super::meta::{self, RecordingMeta, VehicleMeta};
 use crate::support::atomic_file::folder_of;
 use crate::support::plausibility::{Doubts, HELP, Implausible, Quantity};
 use crate::traffic::trajectory::Loaded;
 use crate::traffic::trajectory::csv_table::{CsvColumn, CsvTable};
-use crate::traffic::trajectory::motion::{Impossible, JUMP_ACROSS_M, JUMP_ALONG_M, impossible, jumps};
 use crate::traffic::trajectory::{NO_LANE, Recording, Track};
-use crate::{Error, Place, Result};
+use crate::{Error, Result};
 
 /// Like [`read_checked`], but accepts implausible values.
 ///
@@ -40,7 +38,7 @@ pub fn read_checked(files: &HighdFiles, implausible: Implausible) -> Result<Load
     let reserve = can_hold(&files.tracks, &vehicles);
     let empty = vehicles.iter().map(|vehicle| empty_track(vehicle, reserve)).collect();
     let tracks = read_tracks(&mut table, &columns, &recording_meta, &vehicles, empty, &mut doubts)?;
-    let mut notes = notes(&columns, &vehicles, &tracks, recording_meta.frame_rate_hz);
+    let mut notes = notes(&columns, &vehicles);
     notes.extend(doubts.sentences());
     let checksum_sha256 = vec![table.finish()?, tracks_meta_checksum, recording_meta.checksum];
     let recording = Recording {
@@ -50,19 +48,6 @@ pub fn read_checked(files: &HighdFiles, implausible: Implausible) -> Result<Load
         tracks,
         synthetic: recording_meta.synthetic || made_up(folder_of(&files.recording_meta)).is_some(),
     };
-    let place = Place::file(&files.tracks);
-    notes.extend(geometry::check(&recording, &place, implausible)?);
-    if let Some(Impossible { first: (vehicle, frame), is_speed, problem, .. }) = impossible(&recording) {
-        let problem = format!("vehicle {vehicle} at frame {frame}: {problem}");
-        if implausible == Implausible::Refused {
-            return Err(Error::input(
-                place.column(if is_speed { "xVelocity" } else { "xAcceleration" }),
-                problem,
-                HELP,
-            ));
-        }
-        notes.push(problem);
-    }
     Ok(Loaded { recording, checksum_sha256, notes, vehicle_names: BTreeMap::new(), file_frames: None })
 }
 
@@ -324,7 +309,7 @@ fn check_counts(table: &CsvTable, vehicles: &[VehicleMeta], tracks: &[Track]) ->
 }
 
 /// Warnings about usable data.
-fn notes(columns: &TrackColumns, vehicles: &[VehicleMeta], tracks: &[Track], rate_hz: f64) -> Vec<String> {
+fn notes(columns: &TrackColumns, vehicles: &[VehicleMeta]) -> Vec<String> {
     let mut notes = Vec::new();
     if columns.lane.is_none() {
         notes.push("the column `laneId` is absent: lanes follow from positions and lane lines".to_owned());
@@ -332,23 +317,8 @@ fn notes(columns: &TrackColumns, vehicles: &[VehicleMeta], tracks: &[Track], rat
     if vehicles.iter().any(|vehicle| vehicle.samples.is_none()) {
         notes.push("the tracksMeta file has no `numFrames`: a truncated tracks file cannot be detected".to_owned());
     }
-    let mut note = |what: &str, applies: &dyn Fn(&Track) -> bool| {
-        let mut affected = tracks.iter().filter(|track| applies(track));
-        if let Some(first) = affected.next() {
-            notes.push(format!("{} vehicle(s) {what}, the first is vehicle {}", affected.count() + 1, first.id));
-        }
-    };
-    note("move against their drivingDirection", &|track| {
-        track.s_m.last().zip(track.s_m.first()).is_some_and(|(last, first)| last - first < -BACKWARDS_M)
-    });
-    let jump = format!("jump by more than {JUMP_ALONG_M} m along or {JUMP_ACROSS_M} m across the road");
-    note(&jump, &|track| jumps(track, rate_hz));
-    note("are in no lane of their carriageway at any time", &|track| track.lane.iter().all(|&lane| lane == NO_LANE));
     notes
 }
 
 /// Bytes of the shortest line: eight columns of one digit.
 const MIN_ROW_BYTES: u64 = 16;
-
-/// Minimum backward distance, m, that is not noise of a stationary vehicle.
-const BACKWARDS_M: f64 = 5.0;

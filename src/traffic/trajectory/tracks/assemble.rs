@@ -110,12 +110,7 @@ pub(super) fn assemble(
     tracks.sort_by_key(|track| track.id);
     let mut recording =
         Recording { id: raw.id, frame_rate_hz: rate_hz, carriageways, tracks, synthetic: raw.synthetic };
-    about.judge(&mut recording, preset);
-    if recording.tracks.is_empty() {
-        let why = about.findings.iter().map(|finding| finding.text.as_str()).collect::<Vec<_>>().join("; ");
-        let problem = format!("no vehicle is left: {why}");
-        return Err(Error::input(place.clone(), problem, "correct the file, or its preset"));
-    }
+    about.judge(&mut recording, preset, place)?;
     let (checksum_sha256, notes) = (file.checksums.clone(), Vec::new());
     let loaded = Loaded { recording, checksum_sha256, notes, vehicle_names, file_frames };
     Ok(LoadedTracks { loaded, understanding: about })

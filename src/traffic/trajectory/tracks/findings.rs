@@ -22,6 +22,8 @@ const MAX_ACROSS: f64 = 0.15;
 const ACROSS_M: f64 = 15.0;
 /// What goes farther back along the road drives backwards, m.
 const MAX_BACKWARD_M: f64 = 5.0;
+/// Offsets from the middle of the lane of so many half widths are those of an edge, which gives 1.
+const MIN_EDGE: f64 = 0.6;
 /// Fewer vehicles prove nothing.
 const MIN_VEHICLES: usize = 5;
 
@@ -95,6 +97,10 @@ impl Understanding {
                 self.refuse(format!(
                     "accelerations do not fit the changes of speed ({size} times as large, of the {sign} sign): check their unit and sign"
                 ));
+            } else if !(0.75..=1.25).contains(&told.slope()) {
+                self.warn(format!(
+                    "accelerations are {times} times the changes of speed (0.75 to 1.25 is usual): check whether they are missing for some vehicles, for braking, or have another sign in one direction; without the column they follow from speeds"
+                ));
             }
         }
     }
@@ -130,6 +136,19 @@ impl Understanding {
                 self.refuse(format!("the median vehicle: {}", quantity.describe(middle)));
             }
         }
+        let length_of = |class: VehicleClass| {
+            let mut lengths: Vec<f64> =
+                recording.tracks.iter().filter(|of| of.class == class).map(|of| of.length_m).collect();
+            (lengths.len() >= MIN_VEHICLES).then(|| median(&mut lengths))
+        };
+        if let Some((car_m, lorry_m)) = length_of(VehicleClass::Car).zip(length_of(VehicleClass::Truck))
+            && lorry_m <= car_m
+        {
+            let (car_m, lorry_m) = (significant(car_m, 3), significant(lorry_m, 3));
+            self.warn(format!(
+                "lorries of {lorry_m} m are not longer than cars of {car_m} m: check classes and lengths"
+            ));
+        }
         let is_no_lane = |two: &[f64]| !Quantity::LaneWidth.is_plausible(two[0] - two[1]);
         if recording.carriageways.iter().any(|of| of.lane_lines_m.windows(2).all(is_no_lane)) {
             self.refuse("no lane has a plausible width: check the unit of y, and what `lane` means");
@@ -138,7 +157,16 @@ impl Understanding {
         if 2 * lanes().filter(|lane| **lane == NO_LANE).count() > lanes().count() {
             self.refuse("vehicles are mostly in no lane: check the axes, and the lanes in the file");
         }
-        doubts.sentences().into_iter().for_each(|text| self.warn(text));
+        let mut off = recording.tracks.iter().filter(|track| track.lane.iter().all(|lane| *lane == NO_LANE));
+        if let Some(first) = off.next() {
+            let number = 1 + off.count();
+            self.warn(format!("{number} vehicles are in no lane at any time, the first is vehicle {}", first.id));
+        }
+        // The reader of highD's format says the same, with its line.
+        let kind = |text: &str| text.split(',').next().map(str::to_owned);
+        let is_new = |text: &String| self.findings.iter().all(|known| kind(&known.text) != kind(text));
+        let new: Vec<String> = doubts.sentences().into_iter().filter(is_new).collect();
+        new.into_iter().for_each(|text| self.warn(text));
     }
 
     /// Finds single samples that cannot be, and speeds that do not change.
@@ -169,6 +197,16 @@ impl Understanding {
         if lateral.correlation() < -0.5 && lateral.is_opposite() && recording.tracks.len() >= MIN_VEHICLES {
             self.refuse("vehicles move across the road against their lateral speeds: y, or the lateral speed, is mirrored; see `axes.y`");
         }
+        // Noise makes both slopes smaller: what is beyond 1 is a scale.
+        let scale = lateral.product / lateral.of_given.max(1e-12);
+        let by = if lateral.slope() > 1.0 { 1.0 / lateral.slope() } else { scale };
+        if lateral.correlation() > 0.5 && (by - 1.0).abs() > MAX_SPEED_DIFFERENCE && (by > 1.0 || lateral.slope() > 1.0)
+        {
+            let times = significant(by, 3);
+            self.warn(format!(
+                "vehicles move {times} times as far across the road as their lateral speeds tell: check the unit of y and the width of lanes"
+            ));
+        }
         if let Some((cosine, across)) = heading {
             if cosine < 0.9 {
                 self.refuse(format!(
@@ -198,8 +236,11 @@ impl Understanding {
         }
         if let Some(mismatch) = self.seen.label_mismatch.filter(|mismatch| *mismatch > 0.05) {
             let percent = significant(100.0 * mismatch, 2);
-            let text =
-                format!("{percent} % of the samples are not where the name of their lane says; positions decide");
+            let decides = match self.seen.first_misplaced {
+                Some((vehicle, frame)) => format!("the first is vehicle {vehicle} at frame {frame}; `laneId` decides"),
+                None => "positions decide".to_owned(),
+            };
+            let text = format!("{percent} % of the samples are not where the name of their lane says; {decides}");
             self.find(mismatch > 0.2, text);
         }
     }
@@ -237,14 +278,16 @@ impl Understanding {
                 "{pairs} pairs of vehicles overlap, the first are {first}: check sizes and `reference` (centre, front, rear, corner)"
             ));
         }
-        let (mut by_lane, mut by_class) = (Vec::new(), Vec::new());
-        for at in 0..recording.carriageways.len() {
+        let (mut by_lane, mut by_class, mut shifts) = (Vec::new(), Vec::new(), Vec::new());
+        for (at, of) in recording.carriageways.iter().enumerate() {
             let mut offsets = self.offsets(recording, at);
+            let sign = if of.name == "2" { 1.0 } else { -1.0 };
+            shifts.extend(offsets.iter().map(|(half_m, mean_m, _)| sign * mean_m / half_m));
             by_class.extend(slope_within(&mut offsets, 0.02));
             offsets.iter_mut().for_each(|of| of.2 /= 2);
             by_lane.extend(slope_within(&mut offsets, 0.08));
         }
-        let is_edge = |(slope, error): &(f64, f64)| (0.6..1.6).contains(&slope.abs()) && slope.abs() > 4.0 * error;
+        let is_edge = |(slope, error): &(f64, f64)| (MIN_EDGE..1.6).contains(&slope.abs()) && slope.abs() > 4.0 * error;
         // Lorries may keep to the right in every direction; an edge in the image is on the other side in the other direction.
         let is_turned = matches!(by_lane[..], [(a, _), (b, _)] if a * b < 0.0);
         let found = if is_turned && by_lane.iter().all(is_edge) { by_lane } else { by_class };
@@ -252,6 +295,14 @@ impl Understanding {
             let (slope, error) = (significant(slope.abs(), 2), significant(*error, 1));
             self.refuse(format!(
                 "the wider a vehicle, the farther it is beside the middle of its lane: by {slope} ± {error} m for each metre of half its width, where an edge or a corner of the box gives 1, see `reference`"
+            ));
+        }
+        // Lines that follow from positions are amid them, whatever the point.
+        let shift = median(&mut shifts).abs();
+        if self.seen.lane_sources.is_empty() && shift >= MIN_EDGE && shifts.len() >= MIN_VEHICLES {
+            let shift = significant(shift, 2);
+            self.refuse(format!(
+                "half of the vehicles are at least {shift} half widths beside the middle of their lanes, on one side of the road, so that boxes cross lane lines: y is that of another point of the box"
             ));
         }
         let jumping = recording.tracks.iter().filter(|track| jumps(track, recording.frame_rate_hz)).count();
@@ -271,17 +322,22 @@ impl Understanding {
             Some((track.width_m / 2.0, mean_m, 2 * lane + u16::from(track.class == VehicleClass::Truck)))
         };
         let all: Vec<(f64, f64, u16)> = recording.tracks.iter().filter_map(offset).collect();
-        for (is_truck, class) in [(0, "cars"), (1, "lorries")] {
+        let mean = |(is_truck, class): (u16, &str)| {
             let of: Vec<f64> = all.iter().filter(|of| of.2 % 2 == is_truck).map(|of| of.1).collect();
-            if of.len() >= MIN_VEHICLES {
-                let (n, way) = (of.len() as f64, if lanes.name == "2" { "forward" } else { "backward" });
-                let mean_m = of.iter().sum::<f64>() / n;
-                let error_m = libm::sqrt(of.iter().map(|m| (m - mean_m) * (m - mean_m)).sum::<f64>() / (n * (n - 1.0)));
-                self.fact(
-                    "offsets",
-                    format!("{way}: {class} {mean_m:.2} ± {error_m:.2} m to the left of the middle of their lanes"),
-                );
-            }
+            let n = of.len() as f64;
+            let mean_m = of.iter().sum::<f64>() / n;
+            let error_m = libm::sqrt(of.iter().map(|m| (m - mean_m) * (m - mean_m)).sum::<f64>() / (n * (n - 1.0)));
+            (of.len() >= MIN_VEHICLES).then(|| format!("{class} {mean_m:.2} ± {error_m:.2} m"))
+        };
+        let means: Vec<String> = [(0, "cars"), (1, "lorries")].into_iter().filter_map(mean).collect();
+        // Lines that follow from positions lie amid cars and lorries; the difference holds whatever the lines are.
+        let mut by_class: Vec<_> = all.iter().map(|of| (f64::from(of.2 % 2), of.1, of.2 / 2)).collect();
+        let beside = slope_within(&mut by_class, 0.08).map_or(String::new(), |(by_m, error_m)| {
+            format!("; lorries {by_m:.2} ± {error_m:.2} m to the left of the cars of their lane")
+        });
+        if !means.is_empty() {
+            let (way, means) = (if lanes.name == "2" { "forward" } else { "backward" }, means.join(", "));
+            self.fact("offsets", format!("{way}: {means} to the left of the middle of their lanes{beside}"));
         }
         all
     }
@@ -291,10 +347,13 @@ impl Understanding {
         let all = recording.tracks.len();
         let slow = |track: &Track| track.v_s_mps.iter().filter(|v| **v < NOISE_MPS).count();
         let is_backward = |of: &Track| of.s_m[of.len() - 1] - of.s_m[0] < -MAX_BACKWARD_M || 20 * slow(of) > of.len();
+        let first = recording.tracks.iter().find(|track| is_backward(track)).map_or(0, |track| track.id);
         recording.tracks.retain(|track| !is_backward(track));
         let backwards = all - recording.tracks.len();
-        let what = "vehicles drive backwards (by more than 5 m, or faster than 0.5 m/s) and are left out: check `direction` and the signs of the speeds";
-        self.find_of(backwards as u64, 5 * backwards > all, what);
+        let what = format!(
+            "vehicles drive backwards (by more than 5 m, or faster than 0.5 m/s) and are left out, the first is vehicle {first}: check `direction` and the signs of the speeds"
+        );
+        self.find_of(backwards as u64, 5 * backwards > all, &what);
     }
 
     /// Sets speeds below 0 to 0: they are noise of vehicles that do not drive backwards.

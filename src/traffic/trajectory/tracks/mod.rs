@@ -40,7 +40,6 @@ use super::inputs::files_of;
 use crate::support::atomic_file::folder_of;
 use crate::support::files::file_name;
 use crate::support::input_file::unpacked;
-use crate::support::plausibility::Implausible;
 use crate::{Error, Place, Result};
 
 /// Names of recordings with this word are synthetic, because tables of tracks have no other place to say so.
@@ -181,28 +180,6 @@ pub fn read_tracks(file: &TrackFile, preset: &Preset) -> Result<Vec<LoadedTracks
         assemble::assemble(recording, preset, &facts, &place)
     };
     recordings.into_iter().map(read).collect()
-}
-
-/// Like [`read_tracks`], for runs that use the recordings: minor findings become notes.
-///
-/// # Errors
-/// As [`read_tracks`]; [`Error::Input`] for a grave finding, unless implausible input is accepted.
-pub fn read_usable(file: &TrackFile, preset: &Preset, implausible: Implausible) -> Result<Vec<Loaded>> {
-    let mut usable = Vec::new();
-    for LoadedTracks { mut loaded, understanding } in read_tracks(file, preset)? {
-        if let Some(grave) = understanding.findings.iter().find(|finding| finding.is_grave)
-            && implausible == Implausible::Refused
-        {
-            return Err(Error::input(
-                Place::file(&file.path).of(format!("recording {}", loaded.recording.id)),
-                grave.text.clone(),
-                "`lanesweep tracks` shows all; option `accept_implausible` uses the tracks as they are",
-            ));
-        }
-        loaded.notes.extend(understanding.findings.into_iter().map(|finding| finding.text));
-        usable.push(loaded);
-    }
-    Ok(usable)
 }
 
 /// The names of a file's columns.

@@ -7,6 +7,10 @@ use super::preset::Preset;
 use super::road::median;
 use crate::support::readable::{count, significant};
 use crate::traffic::trajectory::{Loaded, Noise, Recording, Track, VehicleClass};
+use crate::{Error, Place, Result};
+
+/// So far beyond the lane of its `laneId` a centre counts as misplaced, m: in lane changes `laneId` may change a little late.
+const MARGIN_M: f64 = 0.5;
 
 /// Something that is strange in a file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -55,6 +59,8 @@ pub(super) struct Seen {
     pub oncoming_left_m: Option<f64>,
     /// Fraction of the samples whose named lane is not where they are.
     pub label_mismatch: Option<f64>,
+    /// Vehicle and frame of the first of them, where `laneId` decides.
+    pub first_misplaced: Option<(u32, i64)>,
     /// Median difference between positions in the lane as the file gives them and those from the line of the road, m.
     pub lane_offset_error_m: Option<f64>,
 }
@@ -107,21 +113,36 @@ impl Understanding {
         Understanding { recording: recording.to_owned(), ..Understanding::default() }
     }
 
-    /// The same checks of a recording that another reader gave.
-    pub fn of_loaded(mut loaded: Loaded) -> LoadedTracks {
+    /// The same checks of a recording in highD's format.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if no vehicle is left.
+    pub(in crate::traffic::trajectory) fn of_highd(mut loaded: Loaded, place: &Place) -> Result<LoadedTracks> {
         let recording = &loaded.recording;
         let mut about = Understanding::new(&recording.id);
+        std::mem::take(&mut loaded.notes).into_iter().for_each(|note| about.warn(note));
         let rate_hz = recording.frame_rate_hz;
         about.fact("rate", format!("{rate_hz} Hz, from the meta file"));
+        let (mut samples, mut misplaced, mut centres_m) = (0, 0, [Vec::new(), Vec::new()]);
         for track in &recording.tracks {
             about.note_speeds((&track.s_m, Some(&track.v_s_mps)), (&track.d_m, Some(&track.v_d_mps)), rate_hz);
+            about.note_accelerations(&track.v_s_mps, &track.a_s_mps2, rate_hz);
+            let of = &recording.carriageways[track.carriageway];
+            centres_m[usize::from(of.name == "2")].push(track.d_m[track.len() / 2]);
+            for (k, d_m) in track.d_m.iter().enumerate() {
+                let Some(lane) = of.lane(track.lane[k].into()) else { continue };
+                samples += 1;
+                if (d_m - lane.left_m).max(lane.right_m - d_m) > MARGIN_M {
+                    misplaced += 1;
+                    about.seen.first_misplaced.get_or_insert((track.id, track.first_frame + k as i64));
+                }
+            }
         }
-        about.judge(&mut loaded.recording, &Preset::default());
-        // The checks above say these too.
-        let is_said = |note: &String| note.contains("overlap") || note.contains("jump by");
-        let notes = std::mem::take(&mut loaded.notes).into_iter().filter(|note| !is_said(note));
-        notes.for_each(|note| about.warn(note));
-        LoadedTracks { loaded, understanding: about }
+        about.seen.label_mismatch = Some(f64::from(misplaced) / f64::from(samples.max(1)));
+        let [backward_m, forward_m] = centres_m.each_mut().map(|of| median(of));
+        about.seen.oncoming_left_m = Some(-backward_m - forward_m).filter(|left_m| !left_m.is_nan());
+        about.judge(&mut loaded.recording, &Preset::default(), place)?;
+        Ok(LoadedTracks { loaded, understanding: about })
     }
 
     pub(super) fn fact(&mut self, name: &'static str, text: impl Into<String>) {
@@ -161,7 +182,10 @@ impl Understanding {
     }
 
     /// Checks the recording against itself. Leaves out vehicles that drive backwards.
-    pub(super) fn judge(&mut self, recording: &mut Recording, preset: &Preset) {
+    ///
+    /// # Errors
+    /// [`Error::Input`] if no vehicle is left.
+    pub(super) fn judge(&mut self, recording: &mut Recording, preset: &Preset, place: &Place) -> Result<()> {
         self.check_road(recording);
         self.check_speeds(recording);
         self.check_units(recording);
@@ -192,6 +216,12 @@ impl Understanding {
         self.fact("speeds", format!(
             "{speeds} tracks from positions, {lateral} across the road; {accelerations} accelerations from speeds, noise {noise} m/s²"
         ));
+        if recording.tracks.is_empty() {
+            let why = self.findings.iter().map(|finding| finding.text.as_str()).collect::<Vec<_>>().join("; ");
+            let problem = format!("no vehicle is left: {why}");
+            return Err(Error::input(place.clone(), problem, "correct the file, or its preset"));
+        }
+        Ok(())
     }
 
     /// Whether the tracks can be used.
