@@ -187,11 +187,6 @@ impl ExposureFlags {
     pub(super) fn driven(&self) -> Result<Driven> {
         let driven = Driven { hours: self.hours, kilometres: self.km };
         driven.validate()?;
-        if let Some(mean_mps) = self.hours.zip(self.km).map(|(hours, km)| km / hours / 3.6)
-            && !(1.0..=70.0).contains(&mean_mps)
-        {
-            tracing::warn!("--hours and --km: a mean speed of {mean_mps:.3} m/s is not plausible (1 to 70 m/s)");
-        }
         Ok(driven)
     }
 }

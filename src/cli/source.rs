@@ -143,10 +143,15 @@ impl SourceFlags {
     ) -> Result<(Collection, DataProvenance)> {
         let collection = self.report_and_load(configured)?;
         let provenance = self.source(configured).provenance(&collection, given)?;
-        if provenance.driven.is_none() {
+        let Some(driven) = provenance.driven else {
             tracing::warn!(
                 "exposure is unknown, because the scenarios have no driven time and distance; give --hours and --km"
             );
+            return Ok((collection, provenance));
+        };
+        let mean_mps = driven.hours.zip(driven.kilometres).map(|(hours, kilometres)| kilometres / hours / 3.6);
+        if let Some(mean_mps) = mean_mps.filter(|mean_mps| !(1.0..=70.0).contains(mean_mps)) {
+            tracing::warn!("hours and kilometres driven: a mean speed of {mean_mps:.3} m/s is not plausible");
         }
         Ok((collection, provenance))
     }

@@ -208,7 +208,7 @@ fn explain(place: &Place, text: &str, error: &serde_json::Error) -> Error {
         return Error::input(
             place.clone(),
             format!("not JSON: {} at character {}", reason(error), error.column()),
-            "every line holds one complete scenario; NaN and Infinity are not JSON: remove such scenarios",
+            "every line holds one complete scenario: is the file cut off? NaN and Infinity are not JSON",
         );
     };
     if !value.is_object() {

@@ -155,63 +155,50 @@ const IN_LANE_SHARE: f64 = 0.4;
 
 /// Finds scenarios that say one thing twice and differently; one sentence per kind.
 fn contradictions(scenarios: &[Scenario]) -> Vec<String> {
-    let note = |kept: bool, words: &str, help: &str, applies: &dyn Fn(&Scenario) -> bool| {
-        let mut such = scenarios.iter().filter(|s| (s.kept || !kept) && applies(s));
-        let first = such.next()?;
-        Some((such.count() + 1, format!("{words}, the first is scenario {}: {help}", first.id)))
-    };
-    let of = |found: Option<(usize, String)>| found.map(|(count, text)| format!("{count} {text}"));
+    type Rule<'a> = (&'a str, &'a str, &'a dyn Fn(&Scenario) -> bool);
+    let ends = |s: &Scenario| outside_and_inside(s).filter(|_| s.kept);
+    let is_off = |s: &Scenario| ends(s).is_some_and(|(_, inside)| inside.abs() > IN_LANE_SHARE * s.lane_width);
     // A lane change may end beyond its lane; most of a category do not.
-    let off = [Category::CutIn, Category::CutOut].map(|category| {
-        let changes = scenarios.iter().filter(|s| s.kept && s.category == category).count();
-        let is_off = |(_, inside): (f64, f64), width_m| inside.abs() > IN_LANE_SHARE * width_m;
-        let found = note(
-            true,
-            "kept lane changes are never in the ego's lane",
-            "y is the distance from the middle of the ego's lane",
-            &|s| s.category == category && outside_and_inside(s).is_some_and(|ends| is_off(ends, s.lane_width)),
-        );
-        of(found.filter(|(count, _)| 2 * count > changes))
+    let are_off = Category::ALL.map(|category| {
+        let of = || scenarios.iter().filter(|s| s.kept && s.category == category);
+        2 * of().filter(|s| is_off(s)).count() > of().count()
     });
-    [
-        of(note(
-            true,
-            "lane change(s) move away from the ego's lane where they should enter it, or the reverse",
-            "y is the distance from the middle of the ego's lane",
-            &|s| outside_and_inside(s).is_some_and(|(out, inside)| inside.abs() > out.abs() + LATERAL_NOISE_M),
-        )),
-        of(note(
-            true,
+    const MIDDLE: &str = "y is the distance from the middle of the ego's lane";
+    let rules: [Rule; 6] = [
+        ("lane change(s) move away from the ego's lane where they should enter it, or the reverse", MIDDLE, &|s| {
+            ends(s).is_some_and(|(outside, inside)| inside.abs() > outside.abs() + LATERAL_NOISE_M)
+        }),
+        (
             "lane change(s) have a lateral position against their `side`",
             "y is positive on the side that the vehicle comes from or leaves to",
-            &|s| outside_and_inside(s).is_some_and(|(out, _)| out < -LATERAL_NOISE_M),
-        )),
-        of(note(
-            false,
+            &|s| ends(s).is_some_and(|(outside, _)| outside < -LATERAL_NOISE_M),
+        ),
+        ("kept lane change(s) are never in the ego's lane", MIDDLE, &|s| are_off[s.category as usize] && is_off(s)),
+        (
             "scenario(s) have a `gap0` that is not `thw0` times `ego.v0`",
             "one of the three has another unit or belongs to another scenario",
             &|s| {
                 let both = s.gap0.zip(s.thw0).filter(|_| s.ego.v0 > 0.0);
                 both.is_some_and(|(gap, thw)| (gap - thw * s.ego.v0).abs() > (0.05 * gap.abs()).max(0.5))
             },
-        )),
-        of(note(
-            false,
+        ),
+        (
             "scenario(s) have not one sample per frame from `frame0` to `frame1`",
             "samples were left out or added; then `fps` and both frames change too",
             &|s| s.frame1 > s.frame0 && s.frame1.abs_diff(s.frame0).abs_diff(s.target.v.len() as u64 - 1) > 1,
-        )),
-        of(note(
-            false,
+        ),
+        (
             "scenario(s) have a `peak_decel` that the changes of `target.v` contradict",
             "the series has another unit, or `fps` is not its rate",
             &contradicts_its_peak,
-        )),
-    ]
-    .into_iter()
-    .chain(off)
-    .flatten()
-    .collect()
+        ),
+    ];
+    let sentence = |(words, help, applies): &Rule| {
+        let mut such = scenarios.iter().filter(|s| applies(s));
+        let first = such.next()?;
+        Some(format!("{} {words}, the first is scenario {}: {help}", such.count() + 1, first.id))
+    };
+    rules.iter().filter_map(sentence).collect()
 }
 
 /// Lateral position of a lane change where it is out of the ego's lane, and where it is in it, m.

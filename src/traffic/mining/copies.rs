@@ -4,7 +4,7 @@
 use crate::scenario::{Other, Scenario};
 
 /// Scenarios whose numbers differ by less are near copies: m, m/s, s.
-const NEAR: f64 = 1e-3;
+const NEAR: f64 = 0.06;
 
 /// What happens in a scenario, as numbers, whatever it is called.
 fn numbers(of: &Scenario) -> impl Iterator<Item = f64> {
@@ -17,7 +17,7 @@ fn numbers(of: &Scenario) -> impl Iterator<Item = f64> {
     let [v, length, width] = [of.ego.v0, of.ego.length, of.ego.width];
     let plain = [v, category, of.side.sign(), of.fps, length, width, of.lane_width, known(of.start_gap_m().ok())];
     let others = std::iter::once(&of.target).chain(&of.lead).flat_map(series);
-    plain.into_iter().chain([known(of.lead_gap)]).chain(others.collect::<Vec<f64>>())
+    plain.into_iter().chain([known(of.lead_gap)]).chain(others)
 }
 
 /// Leaves out scenarios that are equal to an earlier one but for their names. Returns sentences about them, and about near copies.
@@ -52,6 +52,6 @@ pub(in crate::traffic) fn leave_out_copies(scenarios: &mut Vec<Scenario>) -> Vec
         list.into_iter().next().map(|(_, first)| format!("{number} scenario(s) {what}, the first: {first}"))
     };
     let copies = say(copies, "are equal to another one but for their names and count once");
-    let near = say(near, "differ from another one by less than 1 mm: is a recording there twice?");
+    let near = say(near, "differ from another one by less than 6 cm: is a recording there twice?");
     copies.into_iter().chain(near).collect()
 }

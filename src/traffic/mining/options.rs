@@ -61,11 +61,11 @@ settings! {
         pub quiescent_speed_mps: f64 = 0.25,
         /// Beyond this fraction of the lane width from the line, the change has certainly ended or not yet begun.
         /// Default 0.5 (α_max).
-        #[schemars(range(min = 0.0, max = 1e6))]
+        #[schemars(range(min = 0.0, max = 1.0))]
         pub far_share: f64 = 0.5,
         /// Beyond this fraction of the lane width from the line, steady lateral motion means that the change has ended
         /// or not yet begun. Default 0.1 (α_min).
-        #[schemars(range(min = 0.0, max = 1e6))]
+        #[schemars(range(min = 0.0, max = 1.0))]
         pub near_share: f64 = 0.1,
         /// Maximum time from the crossing to start and end, s. Default 10.
         #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
@@ -98,7 +98,7 @@ settings! {
         #[schemars(range(min = 0.0, max = 1e6))]
         pub pause_s: f64 = 5.0,
         /// Kept only if the target's initial speed is below this fraction of the ego's. Default 0.95 (paper).
-        #[schemars(range(min = 0.0, max = 1e6))]
+        #[schemars(range(min = 0.0, max = 2.0))]
         pub max_speed_share: f64 = 0.95,
         /// Kept only if the initial THW is below this, s. Default 2 (paper).
         #[schemars(range(min = 0.0, max = 1e6))]

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 use super::LoadedTracks;
-use super::boxes::{Sized, centre, is_ignored, sized};
+use super::boxes::{Sized, begins_so, centre, is_ignored, sized};
 use super::directions::{Placed, oncoming_left_m, road};
 use super::lanes::{BY_NAME, Lateral, lane_lines};
 use super::pieces::{Piece, pieces};
@@ -131,8 +131,11 @@ fn describe_columns(about: &mut Understanding, raw: &RawRecording, preset: &Pres
         *classes.entry(class).or_default() += 1;
     }
     if !classes.is_empty() {
-        let of: Vec<String> = classes.iter().take(12).map(|(class, number)| format!("{number} {class}")).collect();
-        about.fact("classes", of.join(", "));
+        let of = classes.iter().take(12).map(|(class, number)| {
+            let lorries = if begins_so(class, &preset.classes.truck) { " (lorries)" } else { "" };
+            format!("{number} {class}{lorries}")
+        });
+        about.fact("classes", of.collect::<Vec<String>>().join(", "));
     }
 }
 

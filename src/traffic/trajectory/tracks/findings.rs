@@ -13,6 +13,8 @@ use crate::traffic::trajectory::{NO_LANE, Recording, Track, VehicleClass};
 
 /// Positions and speeds that differ by more than this fraction do not belong together; good data differ by less than 2 %.
 const MAX_SPEED_DIFFERENCE: f64 = 0.05;
+/// Speeds that are later than positions by more than this are not theirs, s.
+const MAX_DELAY_S: f64 = 0.2;
 /// A speed that positions tell to vary by more is not constant, m/s.
 const MAX_RANGE_MPS: f64 = 2.0;
 /// Fraction of vehicles that overlap from which on sizes or reference point are wrong.
@@ -83,7 +85,11 @@ impl Understanding {
                 self.refuse(format!("vehicles move {times} times as far as their speeds tell: {why}"));
             }
         }
-        let told = self.seen.acceleration;
+        let (delay, told) = (self.seen.delay, self.seen.acceleration);
+        if delay.of_derived > 0.01 * delay.count && delay.slope().abs() > MAX_DELAY_S.max(4.0 * delay.slope_error()) {
+            let by_s = significant(delay.slope(), 2);
+            self.warn(format!("speeds are {by_s} s late against positions: rows are shifted, or filters delay them"));
+        }
         // Below 0.1 m/s in a second there is nothing to compare.
         if told.count > 50.0 && told.of_given.max(told.of_derived) > 0.01 * told.count {
             let size = libm::sqrt(told.of_given / told.of_derived.max(1e-12));
@@ -241,7 +247,7 @@ impl Understanding {
                 None => "positions decide".to_owned(),
             };
             let text = format!("{percent} % of the samples are not where the name of their lane says; {decides}");
-            self.find(mismatch > 0.2, text);
+            self.find(mismatch > 0.2 && recording.tracks.len() >= MIN_VEHICLES, text);
         }
     }
 

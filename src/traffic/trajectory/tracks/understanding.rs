@@ -49,6 +49,8 @@ pub(super) struct Seen {
     pub ratios: Vec<f64>,
     /// Speeds and positions do not belong together, which names the unit that is wrong.
     pub has_wrong_ratio: bool,
+    /// Derived speeds minus given ones, and the accelerations of the given ones: the slope is by how much they are late, s.
+    pub delay: Comparison,
     /// Given lateral speeds and derived ones.
     pub lateral: Comparison,
     /// Given accelerations over a second and the changes of speed.
@@ -161,6 +163,11 @@ impl Understanding {
             let moved_m = s_m[s_m.len() - 1] - s_m[0];
             if driven_m.abs().max(moved_m.abs()) > 20.0 {
                 self.seen.ratios.push(moved_m / driven_m.abs().max(0.1));
+            }
+            let reach = (rate_hz / 2.0).round().max(1.0) as usize;
+            let change = |of: &[f64], k: usize| (of[k + reach] - of[k - reach]) * rate_hz / (2 * reach) as f64;
+            for k in (reach..s_m.len().saturating_sub(reach)).step_by(reach) {
+                self.seen.delay.add(change(s_m, k) - given[k], change(given, k));
             }
         }
         if let Some(given) = given_d {
