@@ -142,7 +142,7 @@ fn what_is_there_twice_counts_once_and_is_named() {
     assert_eq!((found.recordings.len(), kept(&found, Category::CutOut).len(), found.problems.len()), (1, 1, 1));
     assert!(found.problems[0].to_string().contains("run2: it is recording run1 again"), "{}", found.problems[0]);
     let [one] = kept(&found, Category::CutOut)[..] else { panic!() };
-    for (by, number, words) in [(0.0, 1, "count once"), (5e-4, 2, "less than 1 mm"), (0.1, 2, "")] {
+    for (by, number, words) in [(0.0, 1, "count once"), (0.05, 2, "less than 6 cm"), (0.1, 2, "")] {
         let mut other = Scenario { id: "again".to_owned(), recording: "x".to_owned(), ..one.clone() };
         other.lead_gap = other.lead_gap.map(|gap| gap + by);
         let path = dir.path().join("twice.jsonl");
