@@ -86,7 +86,8 @@ fn what_a_scenario_says_twice_and_differently_is_named() {
         s.target.v = s.target.v.iter().copied().step_by(2).collect();
         s.target.y = s.target.y.iter().copied().step_by(2).collect();
     };
-    let cases: [(Category, &dyn Fn(&mut Scenario), &str); 6] = [
+    type Change<'a> = &'a dyn Fn(&mut Scenario);
+    let cases: [(Category, Change, &str); 6] = [
         (Category::Lvd, &slower, "have a `peak_decel` that the changes of `target.v` contradict"),
         (Category::Lvd, &|s| s.fps = 10.0, "have a `peak_decel` that the changes of `target.v` contradict"),
         (Category::Lvd, &thinner, "have not one sample per frame from `frame0` to `frame1`"),

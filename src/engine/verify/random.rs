@@ -24,7 +24,7 @@ fn headways() -> Vec<Headway> {
 /// Plans the random set of a seed. Keys are `random-cut-in-seed157-0000123`; the number is that of the unit.
 ///
 /// # Errors
-/// [`Error::Usage`] without a size, categories or models, or if a category is named twice.
+/// [`Error::Usage`](crate::Error::Usage) without a size, categories or models, or if a category is named twice.
 pub fn random_plan(profile: &Profile, options: &SetOptions) -> Result<LanePlan> {
     options.check()?;
     let headways = headways();

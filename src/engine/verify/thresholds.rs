@@ -20,7 +20,7 @@ pub const SIDES: [&str; 3] = ["S", "below", "above"];
 /// the unit in its category, for any size.
 ///
 /// # Errors
-/// [`Error::Usage`] without a size, categories or models, or if a category is named twice.
+/// [`Error::Usage`](crate::Error::Usage) without a size, categories or models, or if a category is named twice.
 pub fn threshold_plan(profile: &Profile, options: &SetOptions) -> Result<LanePlan> {
     options.check()?;
     let units = options.size * Threshold::ALL.len() as u64;
