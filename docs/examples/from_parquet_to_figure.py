@@ -82,7 +82,7 @@ for panel, model in zip(panels, models):
         panel.fill_between(headways, 100 * low, 100 * high, color=colour, alpha=0.18, linewidth=0)
         panel.plot(headways, 100 * share, style, color=colour, marker=marker, markersize=3.5, label=name)
     panel.set_title(model, color=ink)
-    panel.set_xlabel(f"initial time headway (s)")
+    panel.set_xlabel("initial time headway (s)")
     panel.grid(axis="y", color="#dddddd", linewidth=0.6)
     panel.set_axisbelow(True)
     # The square root of the share: what happens in one case of a hundred is seen beside what happens in most.
@@ -109,7 +109,7 @@ for panel, model in zip(maps, models):
     missed = (changes[changes["model"] == model]["change"] == -1).sum()
     false = (changes[changes["model"] == model]["change"] == 1).sum()
     panel.set_title(f"{model}: {missed} missed, {false} false", color=ink)
-    panel.set_xlabel(f"initial time headway (s)")
+    panel.set_xlabel("initial time headway (s)")
 if listed:
     maps[0].invert_yaxis()
 below.legend(

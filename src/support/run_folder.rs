@@ -269,7 +269,7 @@ impl Results<'_> {
         for (name, file) in &self.staged {
             let is_ours = former.holds(name) || self.named.contains(name) || dir.join(name).symlink_metadata().is_err();
             if !is_ours || list.holds(name) {
-                let problem = "it would be overwritten, and is no result of an earlier run";
+                let problem = "this run would replace it, and no earlier run wrote it";
                 return Err(Error::usage(Place::file(dir.join(name)), problem, "choose another name or folder"));
             }
             let sha256 = self.sha256.remove(name).map_or_else(|| file.sha256(), Ok)?;

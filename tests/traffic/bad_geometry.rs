@@ -87,5 +87,5 @@ fn a_single_vehicle_outside_its_lane_and_boxes_that_overlap_are_warnings() {
     let notes = Texts::of(&recording).read_checked(Implausible::Refused).unwrap().notes;
     let has = |words: &[&str]| notes.iter().any(|note| words.iter().all(|word| note.contains(word)));
     assert!(has(&["10 % of the samples", "vehicle 2 at frame 1", "laneId"]), "{notes:?}");
-    assert!(has(&["1 pairs of vehicles overlap", "vehicles 1 and 6 at frame 25"]), "{notes:?}");
+    assert!(has(&["1 pair(s) of vehicles overlap", "vehicles 1 and 6 at frame 25"]), "{notes:?}");
 }

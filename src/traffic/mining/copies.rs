@@ -23,18 +23,19 @@ fn numbers(of: &Scenario) -> impl Iterator<Item = f64> {
 /// Leaves out scenarios that are equal to an earlier one but for their names. Returns sentences about them, and about near copies.
 pub(in crate::traffic) fn leave_out_copies(scenarios: &mut Vec<Scenario>) -> Vec<String> {
     // Numbers that are close have close sums.
-    let sum = |of: &Scenario| of.ego.v0 + 1.732_050_8 * of.start_gap_m().unwrap_or(0.0) + 2.236_068 * of.target.v[0];
-    let mut order: Vec<(f64, usize)> = scenarios.iter().map(sum).zip(0..).collect();
-    order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let start = |of: &Scenario| [of.ego.v0, of.start_gap_m().unwrap_or(0.0), of.target.v[0]];
+    let sum = |[ego, gap, target]: [f64; 3]| ego + 1.732_050_8 * gap + 2.236_068 * target;
+    let mut order: Vec<([f64; 3], usize)> = scenarios.iter().map(start).zip(0..).collect();
+    order.sort_by(|a, b| sum(a.0).total_cmp(&sum(b.0)).then(a.1.cmp(&b.1)));
+    let differ = |a, b| numbers(a).zip(numbers(b)).any(|(a, b)| (a - b).abs() > NEAR);
     let mut is_copy = vec![false; scenarios.len()];
     let (mut copies, mut near) = (Vec::new(), Vec::new());
-    for (at, &(sum, first)) in order.iter().enumerate() {
-        for &(_, second) in order[at + 1..].iter().take_while(|(other, _)| other - sum <= 5.0 * NEAR) {
-            if is_copy[first] || is_copy[second] {
-                continue;
-            }
+    for (at, &(start, first)) in order.iter().enumerate() {
+        let is_near = |(other, _): &&([f64; 3], usize)| sum(*other) - sum(start) <= 5.0 * NEAR;
+        for &(other, second) in order[at + 1..].iter().take_while(is_near) {
+            let is_far = start.iter().zip(other).any(|(a, b)| (a - b).abs() > NEAR);
             let (a, b) = (&scenarios[first], &scenarios[second]);
-            if numbers(a).zip(numbers(b)).any(|(a, b)| (a - b).abs() > NEAR) {
+            if is_far || is_copy[first] || is_copy[second] || differ(a, b) {
                 continue;
             }
             let (earlier, later) = (first.min(second), first.max(second));
@@ -52,6 +53,6 @@ pub(in crate::traffic) fn leave_out_copies(scenarios: &mut Vec<Scenario>) -> Vec
         list.into_iter().next().map(|(_, first)| format!("{number} scenario(s) {what}, the first: {first}"))
     };
     let copies = say(copies, "are equal to another one but for their names and count once");
-    let near = say(near, "differ from another one by less than 6 cm: is a recording there twice?");
+    let near = say(near, "differ from another one by less than 6 cm and 0.06 m/s: is a recording there twice?");
     copies.into_iter().chain(near).collect()
 }

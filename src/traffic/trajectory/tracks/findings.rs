@@ -166,7 +166,7 @@ impl Understanding {
         let mut off = recording.tracks.iter().filter(|track| track.lane.iter().all(|lane| *lane == NO_LANE));
         if let Some(first) = off.next() {
             let number = 1 + off.count();
-            self.warn(format!("{number} vehicles are in no lane at any time, the first is vehicle {}", first.id));
+            self.warn(format!("{number} vehicle(s) are in no lane at any time, the first is vehicle {}", first.id));
         }
         // The reader of highD's format says the same, with its line.
         let kind = |text: &str| text.split(',').next().map(str::to_owned);
@@ -281,7 +281,7 @@ impl Understanding {
             let fraction = involved.len() as f64 / recording.tracks.len() as f64;
             let (pairs, first) = (found.pairs.len(), &found.first);
             self.find(fraction > MAX_OVERLAPPING && involved.len() >= MIN_VEHICLES, format!(
-                "{pairs} pairs of vehicles overlap, the first are {first}: check sizes and `reference` (centre, front, rear, corner)"
+                "{pairs} pair(s) of vehicles overlap, the first are {first}: check sizes and `reference` (centre, front, rear, corner)"
             ));
         }
         let (mut by_lane, mut by_class, mut shifts) = (Vec::new(), Vec::new(), Vec::new());
