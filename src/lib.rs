@@ -63,13 +63,13 @@
 //! ```
 
 #[cfg(feature = "cli")]
-pub use lanesweep_cli::cli;
-pub use lanesweep_engine::engine;
-pub use lanesweep_model::{model, scenario};
-pub use lanesweep_report::report;
-pub use lanesweep_run::run;
-pub use lanesweep_stats::stats;
-pub use lanesweep_support::{Error, Place, Result, support};
-pub use lanesweep_traffic::traffic;
+pub use lanesweep_cli as cli;
+pub use lanesweep_engine as engine;
+pub use lanesweep_model::{self as model, scenario};
+pub use lanesweep_report as report;
+pub use lanesweep_run as run;
+pub use lanesweep_stats as stats;
+pub use lanesweep_support::{self as support, Error, Place, Result};
+pub use lanesweep_traffic as traffic;
 
 pub mod prelude;

@@ -8,8 +8,8 @@ use std::path::PathBuf;
 
 use clap::{Arg, Command, ValueEnum};
 
-use crate::support::plain_text::nearest;
-use crate::{Error, Place, Result};
+use lanesweep_support::plain_text::nearest;
+use lanesweep_support::{Error, Place, Result};
 
 /// A value. Its [`Display`](fmt::Display) is Python's notation.
 #[derive(Debug, Clone, PartialEq)]
@@ -369,12 +369,12 @@ macro_rules! from_arguments {
         $(groups { $($group:ident),* $(,)? })?
         $(others { $($other:ident: $value:expr),* $(,)? })?
     ) => {
-        impl $crate::cli::arguments::FromArguments for $type {
-            fn from_arguments(arguments: &mut $crate::cli::arguments::Arguments) -> $crate::Result<Self> {
+        impl $crate::arguments::FromArguments for $type {
+            fn from_arguments(arguments: &mut $crate::arguments::Arguments) -> lanesweep_support::Result<Self> {
                 Ok($type {
                     $($field: arguments.take(stringify!($field))?,)*
                     $($($parsed: arguments.parse(stringify!($parsed), $parser)?,)*)?
-                    $($($group: $crate::cli::arguments::FromArguments::from_arguments(arguments)?,)*)?
+                    $($($group: $crate::arguments::FromArguments::from_arguments(arguments)?,)*)?
                     $($($other: $value,)*)?
                 })
             }
@@ -385,9 +385,9 @@ macro_rules! from_arguments {
 /// Implements [`FromValue`] for enumerations.
 macro_rules! choices {
     ($($type:ident),*) => {
-        $(impl $crate::cli::arguments::FromValue for $type {
-            fn of(value: $crate::cli::arguments::Value) -> std::result::Result<Self, String> {
-                $crate::cli::arguments::choice(&value)
+        $(impl $crate::arguments::FromValue for $type {
+            fn of(value: $crate::arguments::Value) -> std::result::Result<Self, String> {
+                $crate::arguments::choice(&value)
             }
         })*
     };

@@ -6,18 +6,18 @@ use std::path::Path;
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
 
 use super::arguments::{Arguments, FromArguments};
-use crate::engine::Headway;
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
-use crate::run::check::Subject;
-use crate::run::reopen::TracedCase;
-use crate::scenario::{
+use lanesweep_engine::Headway;
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scenario::{
     CaseFile, CaseNumber, CaseParameters, CaseRow, NUMBERS, ParameterRows, PlainCase, RowPlace, Written, si,
 };
-use crate::support::input_file::{self, plain_name};
-use crate::support::plausibility::{Doubts, Implausible};
-use crate::support::table::{NameUnit, TableFormat, TableReader};
-use crate::{Error, Place, Result};
+use lanesweep_run::check::Subject;
+use lanesweep_run::reopen::TracedCase;
+use lanesweep_support::input_file::{self, plain_name};
+use lanesweep_support::plausibility::{Doubts, Implausible};
+use lanesweep_support::table::{NameUnit, TableFormat, TableReader};
+use lanesweep_support::{Error, Place, Result};
 
 /// A case in flags: one per number of a case.
 #[derive(Debug, Clone, Default)]

@@ -11,17 +11,17 @@ use super::configured::Configured;
 use super::format::FormatFlag;
 use super::source::{PlausibilityFlag, scenarios_of};
 use super::{COMMIT, Exit, Output};
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
-use crate::report::case_identity::CaseIdentity;
-use crate::report::case_sheet::CaseSheet;
-use crate::run::check::{Check as Checked, Subject};
-use crate::scenario::{Category, Scenario};
-use crate::support::files::{check_output, write_atomically};
-use crate::support::input_file::{self, plain_name};
-use crate::support::plausibility::Doubts;
-use crate::support::table::TableFormat;
-use crate::{Error, Place, Result};
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scenario::{Category, Scenario};
+use lanesweep_report::case_identity::CaseIdentity;
+use lanesweep_report::case_sheet::CaseSheet;
+use lanesweep_run::check::{Check as Checked, Subject};
+use lanesweep_support::files::{check_output, write_atomically};
+use lanesweep_support::input_file::{self, plain_name};
+use lanesweep_support::plausibility::Doubts;
+use lanesweep_support::table::TableFormat;
+use lanesweep_support::{Error, Place, Result};
 
 /// Default profiles; the first one decides.
 const PROFILES: [&str; 6] = ["un-r157", "eu-2022-1426", "eu-2022-1426-standing", "jrc-2021", "paper", "paper-fit"];

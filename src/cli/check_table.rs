@@ -11,17 +11,17 @@ use super::format::FormatFlag;
 use super::signals::CANCEL;
 use super::source::complain_of;
 use super::{Exit, Output};
-use crate::engine::Executor;
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
-use crate::report::case_identity::CaseIdentity;
-use crate::report::case_sheet::CaseSheet;
-use crate::report::case_table::{CaseAnswer, CaseAnswers};
-use crate::run::check::{Check, Subject, nominal_verdicts};
-use crate::support::files::make_folder_of;
-use crate::support::input_file::unchanged;
-use crate::support::plausibility::{Doubts, Implausible};
-use crate::{Error, Place, Result};
+use lanesweep_engine::Executor;
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::profile::Profile;
+use lanesweep_report::case_identity::CaseIdentity;
+use lanesweep_report::case_sheet::CaseSheet;
+use lanesweep_report::case_table::{CaseAnswer, CaseAnswers};
+use lanesweep_run::check::{Check, Subject, nominal_verdicts};
+use lanesweep_support::files::make_folder_of;
+use lanesweep_support::input_file::unchanged;
+use lanesweep_support::plausibility::{Doubts, Implausible};
+use lanesweep_support::{Error, Place, Result};
 
 /// Rows that are judged together, and rows whose lanes are planned together.
 const ROWS: [usize; 2] = [256, 1 << 16];

@@ -8,13 +8,13 @@ use serde_json::json;
 use super::configured::Configured;
 use super::shell::{Completions, Man};
 use super::{Exit, Output, console};
-use crate::cli::settings::{
+use crate::settings::{
     Assignment, DEFAULT_FILE, DEFAULT_FILE_NAME, Layers, Setting, profile_schema, settings_schema, text_of,
 };
-use crate::report::records::document;
-use crate::support::files::write_atomically;
-use crate::support::plain_text::quoted_word;
-use crate::{Error, Place, Result};
+use lanesweep_report::records::document;
+use lanesweep_support::files::write_atomically;
+use lanesweep_support::plain_text::quoted_word;
+use lanesweep_support::{Error, Place, Result};
 
 /// Configurations, completions for your shell, manual pages
 ///

@@ -15,12 +15,12 @@ use super::console::{self, Total, Verbosity};
 use super::help::{DATA, MODELS, RUN};
 use super::signals::CANCEL;
 use super::{COMMIT, Cli, Verb};
-use crate::cli::settings::{Assignment, FILE_VARIABLE, Key, KeyKind, Layers, Origin, Setting, Settings};
-use crate::engine::{BackendChoice, DeviceName, Executor, OpenBackend};
-use crate::model::profile::Profile;
-use crate::report::host::{Host, SettingRecord};
-use crate::support::plain_text::nearest;
-use crate::{Error, Place, Result};
+use crate::settings::{Assignment, FILE_VARIABLE, Key, KeyKind, Layers, Origin, Setting, Settings};
+use lanesweep_engine::{BackendChoice, DeviceName, Executor, OpenBackend};
+use lanesweep_model::profile::Profile;
+use lanesweep_report::host::{Host, SettingRecord};
+use lanesweep_support::plain_text::nearest;
+use lanesweep_support::{Error, Place, Result};
 
 /// The configuration of a run, and what every verb needs besides.
 #[derive(Debug, Clone)]

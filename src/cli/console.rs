@@ -15,10 +15,10 @@ use tracing_subscriber::fmt::MakeWriter;
 use tracing_subscriber::fmt::format::debug_fn;
 
 use super::Exit;
-use crate::report::tables::WIDTH;
-use crate::support::plain_text::{cut, cut_names, quoted_word, shown, shown_in_line, shown_json};
-use crate::support::readable::count;
-use crate::{Error, Result};
+use lanesweep_report::tables::WIDTH;
+use lanesweep_support::plain_text::{cut, cut_names, quoted_word, shown, shown_in_line, shown_json};
+use lanesweep_support::readable::count;
+use lanesweep_support::{Error, Result};
 
 /// Name of standard output in errors.
 const STDOUT: &str = "standard output";
@@ -405,7 +405,7 @@ mod tests {
             command.get_subcommands().for_each(|verb| flags(verb, known));
         }
         let mut known = Vec::new();
-        flags(&crate::cli::configured::command(), &mut known);
+        flags(&crate::configured::command(), &mut known);
         let mut folders = vec![std::path::PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))];
         let mut found = 0;
         while let Some(path) = folders.pop() {

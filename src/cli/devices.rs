@@ -4,7 +4,7 @@ use clap::Args;
 
 use super::Output;
 use super::format::FormatFlag;
-use crate::Result;
+use lanesweep_support::Result;
 
 /// List the compute devices and the one that is used
 ///
@@ -20,8 +20,8 @@ pub(super) struct Devices {
 impl Devices {
     #[cfg(feature = "gpu")]
     pub(super) fn run(&self) -> Result<Output> {
-        use crate::engine::BackendChoice;
-        use crate::engine::gpu::{Adapters, choose};
+        use lanesweep_engine::BackendChoice;
+        use lanesweep_engine::gpu::{Adapters, choose};
         let adapters = Adapters::enumerate();
         let cards = adapters.cards();
         let auto = choose(cards, BackendChoice::Auto, None)?;
@@ -37,13 +37,13 @@ impl Devices {
                 None => "--backend auto selects the CPU: there is no GPU.\n".to_owned(),
             }
         };
-        let json = || crate::report::records::document(&serde_json::json!({"devices": cards, "auto": auto}));
+        let json = || lanesweep_report::records::document(&serde_json::json!({"devices": cards, "auto": auto}));
         self.format.output(super::Exit::Ok, text, json)
     }
 
     #[cfg(not(feature = "gpu"))]
     pub(super) fn run(&self) -> Result<Output> {
-        Err(crate::engine::no_gpu("lanesweep devices"))
+        Err(lanesweep_engine::no_gpu("lanesweep devices"))
     }
 }
 

@@ -9,8 +9,8 @@ use super::configured::{self, Configured};
 use super::console::{self, Verbosity};
 use super::signals::CANCEL;
 use super::{Output, Verb, not_started, pool_of, without_panic};
-use crate::support::cancel::Cancel;
-use crate::{Error, Place, Result};
+use lanesweep_support::cancel::Cancel;
+use lanesweep_support::{Error, Place, Result};
 
 /// Stack of the threads that run a verb, bytes.
 pub const STACK_BYTES: usize = 8 << 20;
@@ -149,7 +149,7 @@ pub fn take_messages() -> Vec<(tracing::Level, String)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::arguments::NEEDS;
+    use crate::arguments::NEEDS;
 
     fn refusal(function: &str, values: &[(&str, Value)]) -> String {
         let values = values.iter().map(|(name, value)| ((*name).to_owned(), value.clone())).collect();

@@ -3,8 +3,8 @@
 use std::io::ErrorKind;
 use std::process::ExitCode;
 
-use crate::Error;
-use crate::run::check::{Answer, Verdict};
+use lanesweep_run::check::{Answer, Verdict};
+use lanesweep_support::Error;
 
 /// Exit codes of every verb.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,7 +35,7 @@ pub enum Exit {
     /// A defect of the program.
     Internal = 70,
     /// A signal or `run.stop_after_s` ended the run early; progress is kept, and the same command resumes.
-    Interrupted = crate::cli::signals::EXIT_STATUS,
+    Interrupted = crate::signals::EXIT_STATUS,
 }
 
 impl Exit {

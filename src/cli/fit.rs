@@ -11,17 +11,17 @@ use super::format::FormatFlag;
 use super::lists;
 use super::source::SourceFlags;
 use super::{Exit, Output};
-use crate::report::density;
-use crate::report::host::SettingRecord;
-use crate::report::records;
-use crate::scenario::DataProvenance;
-use crate::scenario::parameterization::Parameterization;
-use crate::stats::density::{DensityModel, FitOptions, write_density};
-use crate::support::error::push_once;
-use crate::support::files::{check_output, file_name, make_folder_of};
-use crate::support::readable::counted;
-use crate::support::run_folder::RunFolder;
-use crate::{Error, Place, Result};
+use lanesweep_model::scenario::DataProvenance;
+use lanesweep_model::scenario::parameterization::Parameterization;
+use lanesweep_report::density;
+use lanesweep_report::host::SettingRecord;
+use lanesweep_report::records;
+use lanesweep_stats::density::{DensityModel, FitOptions, write_density};
+use lanesweep_support::error::push_once;
+use lanesweep_support::files::{check_output, file_name, make_folder_of};
+use lanesweep_support::readable::counted;
+use lanesweep_support::run_folder::RunFolder;
+use lanesweep_support::{Error, Place, Result};
 
 /// How are the parameters of scenarios distributed?
 ///

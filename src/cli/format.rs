@@ -4,11 +4,11 @@ use clap::{Args, ValueEnum};
 
 use super::arguments::{Arguments, FromArguments};
 use super::{Exit, Output, console};
-use crate::Result;
-use crate::report::study::StudyReport;
-use crate::report::tables;
-use crate::support::readable::count;
-use crate::support::run_folder::Results;
+use lanesweep_report::study::StudyReport;
+use lanesweep_report::tables;
+use lanesweep_support::Result;
+use lanesweep_support::readable::count;
+use lanesweep_support::run_folder::Results;
 
 /// What is printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -83,7 +83,9 @@ impl FormatFlag {
     pub(super) fn planned(self, exit: Exit, lanes: u64, path: &std::path::Path) -> Result<Output> {
         let text = || format!("{} lanes planned in {}\n", count(lanes), path.display());
         self.output(exit, text, || {
-            crate::report::records::document(&serde_json::json!({"lanes": lanes, "plan": path.display().to_string()}))
+            lanesweep_report::records::document(
+                &serde_json::json!({"lanes": lanes, "plan": path.display().to_string()}),
+            )
         })
     }
 }

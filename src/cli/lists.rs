@@ -4,15 +4,15 @@
 use clap::Args;
 
 use super::arguments::from_arguments;
-use crate::engine::Headway;
-use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
-use crate::scenario::Category;
-use crate::scenario::Driven;
-use crate::scenario::parameterization::Parameterization;
-use crate::support::plausibility::Quantity;
-use crate::support::ranges::refuse_repeats;
-use crate::{Error, Place, Result};
+use lanesweep_engine::Headway;
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::scenario::Category;
+use lanesweep_model::scenario::Driven;
+use lanesweep_model::scenario::parameterization::Parameterization;
+use lanesweep_support::plausibility::Quantity;
+use lanesweep_support::ranges::refuse_repeats;
+use lanesweep_support::{Error, Place, Result};
 
 /// Parses the categories of a flag, in the order of every table; all if the list is empty.
 pub(super) fn categories(list: &[String], flag: &str) -> Result<Vec<Category>> {

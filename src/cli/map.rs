@@ -12,15 +12,15 @@ use super::format::FormatFlag;
 use super::settings::MapSettings;
 use super::source::PlausibilityFlag;
 use super::{COMMIT, Exit, Output, lists};
-use crate::model::profile::Profile;
-use crate::report::host::{Host, SweepRecord};
-use crate::report::map::MapReport;
-use crate::run::grid::{self, Grid, GridText, MapGrids, MapOptions, MapResult, PARAMETERS, presets::Presets};
-use crate::scenario::Category;
-use crate::support::plausibility::Doubts;
-use crate::support::readable::{count, value};
-use crate::support::run_folder::{MAP_RECORD, RunFolder};
-use crate::{Error, Place, Result};
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scenario::Category;
+use lanesweep_report::host::{Host, SweepRecord};
+use lanesweep_report::map::MapReport;
+use lanesweep_run::grid::{self, Grid, GridText, MapGrids, MapOptions, MapResult, PARAMETERS, presets::Presets};
+use lanesweep_support::plausibility::Doubts;
+use lanesweep_support::readable::{count, value};
+use lanesweep_support::run_folder::{MAP_RECORD, RunFolder};
+use lanesweep_support::{Error, Place, Result};
 
 /// Seed of the random selection of device lanes that the CPU recomputes.
 const RECHECK_SEED: u64 = 1;

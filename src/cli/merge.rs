@@ -10,14 +10,14 @@ use super::format::FormatFlag;
 use super::sample_options::guard;
 use super::sample_run::list_failures;
 use super::{COMMIT, Exit, Output};
-use crate::report::host::{Host, Timings};
-use crate::report::lanes::sampled_table;
-use crate::report::sampling::SampleReport;
-use crate::report::study::StudyReport;
-use crate::run::parts::PLAN_FILE;
-use crate::run::{Merged, merge};
-use crate::support::plain_text::quoted_word;
-use crate::{Error, Place, Result};
+use lanesweep_report::host::{Host, Timings};
+use lanesweep_report::lanes::sampled_table;
+use lanesweep_report::sampling::SampleReport;
+use lanesweep_report::study::StudyReport;
+use lanesweep_run::parts::PLAN_FILE;
+use lanesweep_run::{Merged, merge};
+use lanesweep_support::plain_text::quoted_word;
+use lanesweep_support::{Error, Place, Result};
 
 /// Merge the parts of a run into its result
 ///

@@ -8,13 +8,13 @@ use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::source::{self, PlausibilityFlag, PresetFlag};
 use super::{Exit, Output, console};
-use crate::Result;
-use crate::scenario::{DataProvenance, check_scenario_file, write_scenarios, write_scenarios_to};
-use crate::support::files::check_output;
-use crate::support::input_file;
-use crate::support::lock::FolderLock;
-use crate::support::readable::counted;
-use crate::traffic::Source;
+use lanesweep_model::scenario::{DataProvenance, check_scenario_file, write_scenarios, write_scenarios_to};
+use lanesweep_support::Result;
+use lanesweep_support::files::check_output;
+use lanesweep_support::input_file;
+use lanesweep_support::lock::FolderLock;
+use lanesweep_support::readable::counted;
+use lanesweep_traffic::Source;
 
 /// Mine cut-ins, cut-outs and leader decelerations from recordings
 ///

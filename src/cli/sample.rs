@@ -9,12 +9,12 @@ use super::format::FormatFlag;
 use super::lists;
 use super::shard_flags::ShardFlags;
 use super::source::PlausibilityFlag;
-use crate::Result;
-use crate::cli::settings::{EstimatorKind, SampleSettings};
-use crate::engine::Headway;
-use crate::model::driver::ModelId;
-use crate::run::sampling::SampleHeadways;
-use crate::stats::density::DensityModel;
+use crate::settings::{EstimatorKind, SampleSettings};
+use lanesweep_engine::Headway;
+use lanesweep_model::driver::ModelId;
+use lanesweep_run::sampling::SampleHeadways;
+use lanesweep_stats::density::DensityModel;
+use lanesweep_support::Result;
 
 /// How likely does a driver fail?
 ///

@@ -4,15 +4,15 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use super::sample::Sample;
-use crate::cli::settings::{EstimatorKind, IntervalKind};
-use crate::model::driver::ModelId;
-use crate::report::lanes::table_format;
-use crate::run::sampling::{Estimator, SampleHeadways, SampleOptions, read_proposal};
-use crate::stats::density::{DensityModel, Mixture};
-use crate::stats::estimate::{BinomialInterval, Goal, Search, StopRule};
-use crate::support::input_file::canonical;
-use crate::support::ranges::refuse_repeats;
-use crate::{Error, Place, Result};
+use crate::settings::{EstimatorKind, IntervalKind};
+use lanesweep_model::driver::ModelId;
+use lanesweep_report::lanes::table_format;
+use lanesweep_run::sampling::{Estimator, SampleHeadways, SampleOptions, read_proposal};
+use lanesweep_stats::density::{DensityModel, Mixture};
+use lanesweep_stats::estimate::{BinomialInterval, Goal, Search, StopRule};
+use lanesweep_support::input_file::canonical;
+use lanesweep_support::ranges::refuse_repeats;
+use lanesweep_support::{Error, Place, Result};
 
 impl Sample {
     /// The rule that ends the run.
@@ -152,5 +152,5 @@ pub(super) fn guard(table: &Path, flag: &str, out: &Path, other: Option<&PathBuf
     let others: Vec<PathBuf> = results.iter().map(|name| out.join(name)).chain(other.cloned()).collect();
     super::source::refuse_overwriting(table, &others, flag)?;
     table_format(table)?;
-    crate::support::files::check_output(table)
+    lanesweep_support::files::check_output(table)
 }

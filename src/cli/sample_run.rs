@@ -8,19 +8,19 @@ use super::sample::Sample;
 use super::sample_options::{guard, only_crude};
 use super::signals::CANCEL;
 use super::{Exit, Output};
-use crate::engine::{Chunk, CpuBackend, Executor, LanePlan, OpenBackend};
-use crate::report::lanes;
-use crate::report::sampling::SampleReport;
-use crate::run::parts::{EachChunk, Job, PLAN_FILE};
-use crate::run::sampling::{self, EstimateRow, FailingLane, SampleJob, SampleKind, SampleOptions, SampleResult};
-use crate::stats::density::read_density;
-use crate::stats::estimate::{Search, StopRule};
-use crate::support::atomic_file::StagedFile;
-use crate::support::files::check_folder;
-use crate::support::readable::{count, counted, duration};
-use crate::support::run_folder::{ESTIMATE_RECORD, RunFolder};
-use crate::support::table::TableWriter;
-use crate::{Error, Place, Result};
+use lanesweep_engine::{Chunk, CpuBackend, Executor, LanePlan, OpenBackend};
+use lanesweep_report::lanes;
+use lanesweep_report::sampling::SampleReport;
+use lanesweep_run::parts::{EachChunk, Job, PLAN_FILE};
+use lanesweep_run::sampling::{self, EstimateRow, FailingLane, SampleJob, SampleKind, SampleOptions, SampleResult};
+use lanesweep_stats::density::read_density;
+use lanesweep_stats::estimate::{Search, StopRule};
+use lanesweep_support::atomic_file::StagedFile;
+use lanesweep_support::files::check_folder;
+use lanesweep_support::readable::{count, counted, duration};
+use lanesweep_support::run_folder::{ESTIMATE_RECORD, RunFolder};
+use lanesweep_support::table::TableWriter;
+use lanesweep_support::{Error, Place, Result};
 
 impl Sample {
     pub(crate) fn run(&self, configured: &Configured) -> Result<Output> {

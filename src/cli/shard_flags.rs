@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::arguments::from_arguments;
-use crate::run::parts::Shard;
+use lanesweep_run::parts::Shard;
 
 /// Flags of every verb that can be split.
 #[derive(Debug, Clone, Args)]

@@ -8,8 +8,8 @@ use clap_complete::Shell;
 
 use super::configured::command;
 use super::{Exit, Output, console};
-use crate::support::files::{make_folder, write_inside};
-use crate::{Error, Result};
+use lanesweep_support::files::{make_folder, write_inside};
+use lanesweep_support::{Error, Result};
 
 /// Print the completions for a shell
 ///

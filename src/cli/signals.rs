@@ -7,7 +7,7 @@
 use std::sync::LazyLock;
 use std::time::Duration;
 
-use crate::support::cancel::Cancel;
+use lanesweep_support::cancel::Cancel;
 
 /// Exit status of an interrupted run that resumes when repeated.
 pub(super) const EXIT_STATUS: u8 = 75;
@@ -98,7 +98,7 @@ fn end_at_once(signal: i32) -> ! {
 #[cfg(unix)]
 fn end_with(status: i32) -> ! {
     // While the guard lives, no file can be created.
-    let _live = crate::support::atomic_file::remove_live();
+    let _live = lanesweep_support::atomic_file::remove_live();
     // Skips the exit handlers of libraries (such as drivers) whose threads are running.
     signal_hook::low_level::exit(status)
 }

@@ -12,12 +12,12 @@ use super::format::FormatFlag;
 use super::source::{PlausibilityFlag, scenarios_of};
 use super::xosc::{self, XoscFlags};
 use super::{Exit, Output};
-use crate::report::openscenario::{Concrete, PlayOptions, concrete_case};
-use crate::report::trace::TraceReport;
-use crate::run::reopen::{Reopened, TracedLanes};
-use crate::support::files::{check_output, file_name, write_atomically};
-use crate::support::run_folder::is_listed;
-use crate::{Error, Place, Result};
+use lanesweep_report::openscenario::{Concrete, PlayOptions, concrete_case};
+use lanesweep_report::trace::TraceReport;
+use lanesweep_run::reopen::{Reopened, TracedLanes};
+use lanesweep_support::files::{check_output, file_name, write_atomically};
+use lanesweep_support::run_folder::is_listed;
+use lanesweep_support::{Error, Place, Result};
 
 /// Run one concrete scenario and print or draw its time series
 ///

@@ -9,12 +9,12 @@ use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::console::{self, Total};
 use super::signals::CANCEL;
-use crate::scenario::{DataProvenance, Driven, Scenario, ScenarioFile, read_scenario_file};
-use crate::support::input_file::canonical;
-use crate::support::plausibility::Implausible;
-use crate::traffic::Source;
-use crate::traffic::mining::{Collection, counts, counts_text};
-use crate::{Error, Place, Result};
+use lanesweep_model::scenario::{DataProvenance, Driven, Scenario, ScenarioFile, read_scenario_file};
+use lanesweep_support::input_file::canonical;
+use lanesweep_support::plausibility::Implausible;
+use lanesweep_support::{Error, Place, Result};
+use lanesweep_traffic::Source;
+use lanesweep_traffic::mining::{Collection, counts, counts_text};
 
 /// Reads or generates recordings and mines them, with a progress bar; reports skipped input and the number of
 /// scenarios.

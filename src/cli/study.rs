@@ -13,18 +13,18 @@ use super::settings::KeepPlan;
 use super::shard_flags::ShardFlags;
 use super::source::{self, SourceFlags};
 use super::{COMMIT, Exit, Output, lists};
-use crate::engine::{Chunk, Headway, LanePlan, OpenBackend};
-use crate::report::host::{Host, Timings};
-use crate::report::lanes::{study_table, table_format, write_study_chunk};
-use crate::report::study::StudyReport;
-use crate::run::parts::{EachChunk, Job, PLAN_FILE, RUN_PLAN_FILE};
-use crate::run::study::{self, ExternalReplay, ReferenceComparison, StudyOptions, StudyResult};
-use crate::support::files::{check_folder, check_output};
-use crate::support::input_file;
-use crate::support::readable;
-use crate::support::run_folder::{Results, RunFolder, STUDY_RECORD};
-use crate::traffic::Source;
-use crate::{Error, Place, Result};
+use lanesweep_engine::{Chunk, Headway, LanePlan, OpenBackend};
+use lanesweep_report::host::{Host, Timings};
+use lanesweep_report::lanes::{study_table, table_format, write_study_chunk};
+use lanesweep_report::study::StudyReport;
+use lanesweep_run::parts::{EachChunk, Job, PLAN_FILE, RUN_PLAN_FILE};
+use lanesweep_run::study::{self, ExternalReplay, ReferenceComparison, StudyOptions, StudyResult};
+use lanesweep_support::files::{check_folder, check_output};
+use lanesweep_support::input_file;
+use lanesweep_support::readable;
+use lanesweep_support::run_folder::{Results, RunFolder, STUDY_RECORD};
+use lanesweep_support::{Error, Place, Result};
+use lanesweep_traffic::Source;
 
 /// How far do parameterized scenarios agree with recorded ones?
 ///

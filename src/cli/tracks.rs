@@ -12,19 +12,19 @@ use super::configured::Configured;
 use super::console::Total;
 use super::format::FormatFlag;
 use super::{Exit, Output, source};
-use crate::report::tracks::{TrackReport, across};
-use crate::scenario::usable;
-use crate::support::files::check_output;
-use crate::support::plausibility::Implausible;
-use crate::support::run_folder::RunFolder;
-use crate::support::table::{Table, TableMetadata};
-use crate::traffic::Source;
-use crate::traffic::mining::{counts, mine, noise_notes};
-use crate::traffic::trajectory::generator::generate_one;
-use crate::traffic::trajectory::highd::{self, SYNTHETIC_MARKER};
-use crate::traffic::trajectory::tracks::{LoadedTracks, SYNTHETIC};
-use crate::traffic::trajectory::{InputFile, Inputs, Loaded, NO_LANE, Recording, Track, VehicleClass};
-use crate::{Error, Place, Result};
+use lanesweep_model::scenario::usable;
+use lanesweep_report::tracks::{TrackReport, across};
+use lanesweep_support::files::check_output;
+use lanesweep_support::plausibility::Implausible;
+use lanesweep_support::run_folder::RunFolder;
+use lanesweep_support::table::{Table, TableMetadata};
+use lanesweep_support::{Error, Place, Result};
+use lanesweep_traffic::Source;
+use lanesweep_traffic::mining::{counts, mine, noise_notes};
+use lanesweep_traffic::trajectory::generator::generate_one;
+use lanesweep_traffic::trajectory::highd::{self, SYNTHETIC_MARKER};
+use lanesweep_traffic::trajectory::tracks::{LoadedTracks, SYNTHETIC};
+use lanesweep_traffic::trajectory::{InputFile, Inputs, Loaded, NO_LANE, Recording, Track, VehicleClass};
 
 /// What is in a track file? Check it, draw it, convert it
 ///

@@ -7,15 +7,15 @@ use super::console::{self, Total};
 use super::format::FormatFlag;
 use super::source::SourceFlags;
 use super::{Exit, Output};
-use crate::engine::LanePlan;
-use crate::engine::verify::{SetOptions, compare, random_plan, threshold_plan};
-use crate::model::profile::Profile;
-use crate::report::{records, verification};
-use crate::run::study::{StudyOptions, plan_study};
-use crate::scenario::Category;
-use crate::support::readable::count;
-use crate::traffic::mining::{counts, counts_text};
-use crate::{Error, Place, Result};
+use lanesweep_engine::LanePlan;
+use lanesweep_engine::verify::{SetOptions, compare, random_plan, threshold_plan};
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scenario::Category;
+use lanesweep_report::{records, verification};
+use lanesweep_run::study::{StudyOptions, plan_study};
+use lanesweep_support::readable::count;
+use lanesweep_support::{Error, Place, Result};
+use lanesweep_traffic::mining::{counts, counts_text};
 
 /// Check that a device computes every lane as the CPU does
 ///

@@ -6,13 +6,13 @@ use clap::{Args, ValueEnum};
 
 use super::arguments::{choices, from_arguments};
 use super::case_flags::time_s;
-use crate::engine::LaneKey;
-use crate::report::openscenario::{Concrete, EgoMotion, INDEX, PlayOptions, concrete_lanes, export_folder};
-use crate::run::reopen::Reopened;
-use crate::scenario::{Scenario, Side};
-use crate::support::readable::counted;
-use crate::support::run_folder::RunFolder;
-use crate::{Error, Place, Result};
+use lanesweep_engine::LaneKey;
+use lanesweep_model::scenario::{Scenario, Side};
+use lanesweep_report::openscenario::{Concrete, EgoMotion, INDEX, PlayOptions, concrete_lanes, export_folder};
+use lanesweep_run::reopen::Reopened;
+use lanesweep_support::readable::counted;
+use lanesweep_support::run_folder::RunFolder;
+use lanesweep_support::{Error, Place, Result};
 
 /// OpenSCENARIO files of the lanes.
 #[derive(Debug, Args)]

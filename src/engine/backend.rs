@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::counting::Counted;
 use super::outcome::{Outcome, Verdicts};
 use super::plan::LanePlan;
-use crate::{Error, Result};
+use lanesweep_support::{Error, Result};
 
 /// Which results a sweep returns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

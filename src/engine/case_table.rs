@@ -2,7 +2,7 @@
 
 use super::lane_case::LaneCase;
 use super::plan::CaseSource;
-use crate::scenario::Tables;
+use lanesweep_model::scenario::Tables;
 
 /// The cases of every block, and the series that they share.
 #[derive(Default)]

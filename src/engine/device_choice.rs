@@ -6,7 +6,7 @@ use std::str::FromStr;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result};
 
 /// A device as a user names it.
 #[derive(Debug, Clone, PartialEq, Eq)]

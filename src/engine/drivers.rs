@@ -1,10 +1,10 @@
 //! The profile's constants for one category, resolved, and the dispatch over driver models.
 
-use crate::model::criterion::Criteria;
-use crate::model::driver::{self, DriverModel, DriverProfile, ModelId};
-use crate::model::profile::Profile;
-use crate::model::scalar::Real;
-use crate::scenario::{Category, Tables};
+use lanesweep_model::criterion::Criteria;
+use lanesweep_model::driver::{self, DriverModel, DriverProfile, ModelId};
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scalar::Real;
+use lanesweep_model::scenario::{Category, Tables};
 
 use super::cpu::foreign::{Setting, run_one};
 use super::cpu::lane_result::Ending;
@@ -127,7 +127,7 @@ macro_rules! declare_constants {
         }
     };
 }
-crate::for_every_driver_model!(declare_constants);
+lanesweep_model::for_every_driver_model!(declare_constants);
 
 /// A single lane of a driver outside the registry.
 ///
@@ -151,8 +151,8 @@ fn foreign_lane<R: Real>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Place;
-    use crate::random::philox4x32_10;
+    use lanesweep_random::philox4x32_10;
+    use lanesweep_support::Place;
 
     /// Random profiles of range limits, 0 where allowed, and numbers between.
     #[test]

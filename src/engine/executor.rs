@@ -7,8 +7,8 @@ use std::sync::Arc;
 use super::backend::{Backend, Chunk, Session, Wanted};
 use super::plan::LanePlan;
 use super::recheck::{Recheck, RecheckOptions};
-use crate::support::cancel::Cancel;
-use crate::{Error, Result};
+use lanesweep_support::cancel::Cancel;
+use lanesweep_support::{Error, Result};
 
 /// The backend of a run, its fallback, and the lanes to recheck. `Executor<'static>` owns its backends;
 /// `Executor::new(&backend)` borrows one and lives as long as the backend.

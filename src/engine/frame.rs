@@ -1,9 +1,9 @@
 //! The frame around a lane's steps: time and end rules, the initial headway, and the constants common to all lanes of
 //! one model.
 
-use crate::model::criterion::Criteria;
-use crate::model::profile::{CutOutTarget, FrameProfile};
-use crate::model::scalar::Real;
+use lanesweep_model::criterion::Criteria;
+use lanesweep_model::profile::{CutOutTarget, FrameProfile};
+use lanesweep_model::scalar::Real;
 
 use super::scene::Scene;
 

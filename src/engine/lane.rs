@@ -1,8 +1,8 @@
 //! One lane from start to end, step by step, with an observer.
 
-use crate::model::driver::{DriverModel, Hazard};
-use crate::model::scalar::Real;
-use crate::scenario::Tables;
+use lanesweep_model::driver::{DriverModel, Hazard};
+use lanesweep_model::scalar::Real;
+use lanesweep_model::scenario::Tables;
 
 use super::cpu::lane_result::conclude;
 use super::frame::{Simulation, Start};

@@ -5,12 +5,14 @@
 //! Laterally, a vehicle is evaluated once per step, so it must not pass from one side of the ego to the other within a
 //! step. Derivation: docs/src/methods/lane.md, time step.
 
-pub(crate) use crate::model::driver::NEVER;
-use crate::model::driver::{AttentionRule, DriverProfile, LaneGeometry, MODELS};
-use crate::model::profile::{CutOutEvaluated, CutOutTarget, Profile};
-use crate::model::scalar::Real;
-use crate::scenario::{Case, Category, LATERAL_SAMPLED, Lateral, Motion, Participant, SPEED_SAMPLED, Speed, Tables};
-use crate::{Error, Place, Result};
+pub(crate) use lanesweep_model::driver::NEVER;
+use lanesweep_model::driver::{AttentionRule, DriverProfile, LaneGeometry, MODELS};
+use lanesweep_model::profile::{CutOutEvaluated, CutOutTarget, Profile};
+use lanesweep_model::scalar::Real;
+use lanesweep_model::scenario::{
+    Case, Category, LATERAL_SAMPLED, Lateral, Motion, Participant, SPEED_SAMPLED, Speed, Tables,
+};
+use lanesweep_support::{Error, Place, Result};
 
 /// One other vehicle of a lane.
 #[repr(C)]
@@ -29,7 +31,7 @@ pub struct LaneOther<R> {
     /// First step at which it is no longer present.
     pub present_until: u32,
     /// First step at which each driver model may react to it, in the order of
-    /// [`ModelId::ALL`](crate::model::driver::ModelId::ALL).
+    /// [`ModelId::ALL`](lanesweep_model::driver::ModelId::ALL).
     pub attend_from: [u32; MODELS],
     /// 1 if the slot is used.
     pub used: u32,
@@ -191,13 +193,13 @@ fn attend(case: &Case, profile: &Profile, series: &Series, others: &mut [LaneOth
 /// Defines [`attention_rules`] from the registry of driver models.
 macro_rules! declare_attention {
     ($($(#[$attribute:meta])* $file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
-        /// Attention rule of each driver model, in the order of [`ModelId::ALL`](crate::model::driver::ModelId::ALL).
+        /// Attention rule of each driver model, in the order of [`ModelId::ALL`](lanesweep_model::driver::ModelId::ALL).
         pub fn attention_rules(profile: &Profile, category: Category) -> [AttentionRule<f64>; MODELS] {
             [$(profile.$file.attention(profile.frame.dt_s, category)),+]
         }
     };
 }
-crate::for_every_driver_model!(declare_attention);
+lanesweep_model::for_every_driver_model!(declare_attention);
 
 /// The JRC's cut-out: no vehicle is present before the exposure, then the vehicle ahead. A cutting-out vehicle that
 /// hits it freezes there and takes its place.
@@ -300,8 +302,8 @@ fn passes(motion: &Motion<f64>, tables: &Tables<f64>, half_widths: f64) -> Optio
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::profile::Profile;
-    use crate::scenario::{Case, Category, Lateral, Participant, Speed};
+    use lanesweep_model::profile::Profile;
+    use lanesweep_model::scenario::{Case, Category, Lateral, Participant, Speed};
 
     fn check(lateral: Lateral, dt_s: f64) -> Result<()> {
         let profile = Profile::load("paper").unwrap().with_dt(dt_s).unwrap();

@@ -9,10 +9,10 @@
 //! Truth values are [`Flag`]s, which vector units combine fastest. Step indices are at most [`Flag::LATEST_STEP`],
 //! which stands for "never".
 
-use crate::model::criterion::{BrakeThreatMaximum, Criteria, Measures, TtcMinimum, held_in_contact, overlaps_along};
-use crate::model::driver::{DriverModel, DriverState, Hazard, View};
-use crate::model::scalar::{Flag, Real};
-use crate::scenario::{Motion, Tables};
+use lanesweep_model::criterion::{BrakeThreatMaximum, Criteria, Measures, TtcMinimum, held_in_contact, overlaps_along};
+use lanesweep_model::driver::{DriverModel, DriverState, Hazard, View};
+use lanesweep_model::scalar::{Flag, Real};
+use lanesweep_model::scenario::{Motion, Tables};
 
 use super::frame::{Frame, Simulation, Start};
 use super::lane_case::{LaneCase, LaneOther};

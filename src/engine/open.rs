@@ -7,8 +7,8 @@ use super::backend::Backend;
 use super::cpu::backend::CpuBackend;
 use super::device_choice::{BackendChoice, DeviceName};
 use super::executor::Executor;
-use crate::support::cancel::Cancel;
-use crate::{Error, Result};
+use lanesweep_support::cancel::Cancel;
+use lanesweep_support::{Error, Result};
 
 /// A device that computes lanes.
 #[derive(Debug, Clone, Serialize)]

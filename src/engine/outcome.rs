@@ -1,7 +1,7 @@
 //! The results of a finished lane.
 
-use crate::model::criterion::{Contact, Criterion};
-use crate::model::scalar::Real;
+use lanesweep_model::criterion::{Contact, Criterion};
+use lanesweep_model::scalar::Real;
 
 /// "Did not happen" as a step index.
 pub const NO_STEP: u32 = u32::MAX;

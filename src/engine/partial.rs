@@ -9,8 +9,8 @@ use super::backend::Chunk;
 use super::confusion::Confusion;
 use super::outcome::Verdicts;
 use super::plan::LanePlan;
-use crate::model::criterion::Criterion;
-use crate::{Error, Place, Result};
+use lanesweep_model::criterion::Criterion;
+use lanesweep_support::{Error, Place, Result};
 
 /// Counts of one unit: cells in the order variant, model, criterion.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -18,7 +18,7 @@ pub struct UnitCounts {
     /// Unit, counted over all blocks.
     pub unit: u64,
     /// One per variant × model × criterion.
-    #[serde(with = "crate::engine::confusion::packed")]
+    #[serde(with = "crate::confusion::packed")]
     pub cells: Vec<Confusion<u32>>,
     /// Lanes that ended at the time cap, one per variant × model.
     pub capped: Vec<u32>,

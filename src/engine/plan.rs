@@ -9,12 +9,12 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::frame::Start;
-use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
-use crate::scenario::{Category, Tables};
-use crate::support::ranges::refuse_repeats;
-use crate::{Error, Place, Result};
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scenario::{Category, Tables};
+use lanesweep_support::ranges::refuse_repeats;
+use lanesweep_support::{Error, Place, Result};
 
 use super::generated::Generator;
 use super::lane_case::{LaneCase, check_time_step};
@@ -105,7 +105,7 @@ impl Headway {
     }
 
     /// The start of a lane, rounded once.
-    pub fn start<R: crate::model::scalar::Real>(self) -> Start<R> {
+    pub fn start<R: lanesweep_model::scalar::Real>(self) -> Start<R> {
         match self {
             Headway::ThwS(s) => Start::Headway(R::from_f64(s)),
             Headway::GapM(m) => Start::Gap(R::from_f64(m)),
@@ -407,7 +407,7 @@ impl LanePlan {
 }
 
 /// Checks the cases of these units of blocks if they are known before their lanes run. Vehicles of a
-/// [generated](crate::engine::generated) case start or end in the ego's lane and never pass across it.
+/// [generated](crate::generated) case start or end in the ego's lane and never pass across it.
 ///
 /// # Errors
 /// As [`check_time_step`].

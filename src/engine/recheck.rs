@@ -10,7 +10,7 @@ use super::cpu::runner::LaneRunner;
 use super::cpu::simd::Instructions;
 use super::outcome::{Outcome, Verdicts};
 use super::plan::{LaneKey, LanePlan};
-use crate::{Error, Result};
+use lanesweep_support::{Error, Result};
 
 /// Default sampling rate: one lane in 1000 is rechecked.
 const ONE_IN: u64 = 1000;
@@ -220,19 +220,19 @@ fn mixed(seed: u64, index: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::cpu::lane_stream::run_stream;
-    use crate::engine::cpu::pending_lanes::Lanes;
-    use crate::engine::cpu::series::Series;
-    use crate::engine::drivers::Constants;
-    use crate::engine::frame::Simulation;
-    use crate::engine::lane::{Silent, run_lane};
-    use crate::engine::scene::{Scene, fastest_in, may_cross};
-    use crate::engine::verify::{SetOptions, random_plan};
-    use crate::engine::{Backend, CpuBackend, Executor, LaneCase, Session, SweepSummary, Wanted};
-    use crate::model::driver::{DriverModel, DriverState, Hazard, ModelId, View};
-    use crate::model::profile::Profile;
-    use crate::model::scalar::{Flag, Real};
-    use crate::scenario::{Category, Tables};
+    use crate::cpu::lane_stream::run_stream;
+    use crate::cpu::pending_lanes::Lanes;
+    use crate::cpu::series::Series;
+    use crate::drivers::Constants;
+    use crate::frame::Simulation;
+    use crate::lane::{Silent, run_lane};
+    use crate::scene::{Scene, fastest_in, may_cross};
+    use crate::verify::{SetOptions, random_plan};
+    use crate::{Backend, CpuBackend, Executor, LaneCase, Session, SweepSummary, Wanted};
+    use lanesweep_model::driver::{DriverModel, DriverState, Hazard, ModelId, View};
+    use lanesweep_model::profile::Profile;
+    use lanesweep_model::scalar::{Flag, Real};
+    use lanesweep_model::scenario::{Category, Tables};
 
     #[derive(Debug, Clone, Copy, PartialEq)]
     enum FalsePromise {

@@ -1,8 +1,8 @@
 //! Properties of the other vehicles that are known before a lane runs, so that its steps need not test them.
 
-use crate::model::driver::MODELS;
-use crate::model::scalar::Real;
-use crate::scenario::{LATERAL_SAMPLED, Motion, SPEED_SAMPLED, Tables};
+use lanesweep_model::driver::MODELS;
+use lanesweep_model::scalar::Real;
+use lanesweep_model::scenario::{LATERAL_SAMPLED, Motion, SPEED_SAMPLED, Tables};
 
 use super::lane_case::{LaneCase, LaneOther, NEVER};
 
@@ -175,8 +175,8 @@ pub(super) fn is_centred<R: Real>(other: &LaneOther<R>, ego_width: R) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::profile::Profile;
-    use crate::scenario::{Ahead, Case, Category, Lateral, Participant, Speed};
+    use lanesweep_model::profile::Profile;
+    use lanesweep_model::scenario::{Ahead, Case, Category, Lateral, Participant, Speed};
 
     fn case(category: Category, lateral: Lateral, has_second: bool) -> LaneCase<f64> {
         let vehicle = |lateral| Participant { length_m: 4.5, width_m: 1.8, speed: Speed::constant(20.0), lateral };

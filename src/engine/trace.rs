@@ -7,11 +7,11 @@ use super::lane_case::LaneCase;
 use super::lane_step::Seen;
 use super::outcome::{NO_STEP, Outcome};
 use super::plan::{Headway, LaneKey};
-use crate::model::criterion::Contact;
-use crate::model::driver::{ModelId, View};
-use crate::model::profile::Profile;
-use crate::model::scalar::Real;
-use crate::scenario::{Category, Tables};
+use lanesweep_model::criterion::Contact;
+use lanesweep_model::driver::{ModelId, View};
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scalar::Real;
+use lanesweep_model::scenario::{Category, Tables};
 
 /// Another vehicle at one step. The measures are computed in f64 from the values that the lane used.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -8,8 +8,8 @@ use sha2::{Digest, Sha256};
 
 use super::generated::{Generator, PointSource};
 use super::lane_case::{LaneCase, LaneOther};
-use crate::scenario::{Motion, Tables};
-use crate::support::plain_text::hex;
+use lanesweep_model::scenario::{Motion, Tables};
+use lanesweep_support::plain_text::hex;
 
 /// Version of the lane computation, from a scenario or a sample's index to its verdicts and values. Raise it whenever a
 /// bit of any lane can change: plans, parts, journals and records of another version are refused. Package versions with
@@ -51,9 +51,10 @@ impl Canonical {
     }
 
     /// A serializable value: every value with its kind, the fields of a structure with their names, sorted by name.
-    pub fn value(&mut self, value: &impl Serialize) -> crate::Result<()> {
-        let value = serde_json::to_value(value)
-            .map_err(|e| crate::Error::Internal(format!("a plan has something that cannot be hashed: {e}")))?;
+    pub fn value(&mut self, value: &impl Serialize) -> lanesweep_support::Result<()> {
+        let value = serde_json::to_value(value).map_err(|e| {
+            lanesweep_support::Error::Internal(format!("a plan has something that cannot be hashed: {e}"))
+        })?;
         self.json(&value);
         Ok(())
     }

@@ -4,9 +4,9 @@
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::Place;
-use crate::model::profile::Profile;
-use crate::support::input_file;
+use crate::profile::Profile;
+use lanesweep_support::Place;
+use lanesweep_support::input_file;
 
 const CONSTANTS: &str = include_str!("../../configs/constants.toml");
 

@@ -7,8 +7,8 @@
 use super::category::Category;
 use super::motion::{Lateral, Motion, Speed, Tables};
 use super::profile::{CutOutTarget, Profile};
-use crate::support::readable::value;
-use crate::{Error, Place, Result};
+use lanesweep_support::readable::value;
+use lanesweep_support::{Error, Place, Result};
 
 /// A vehicle other than the ego.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result};
 
 /// The three kinds of scenario of UN R157, Annex 3.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]

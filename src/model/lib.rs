@@ -1,8 +1,16 @@
-//! Drivers, criteria, profiles, cases and scenarios. The rooms that its modules may use stand below; `lanesweep` is the crate for users.
+//! The simulated system: drivers, criteria, the profile with every constant, the concrete case, the motion of its
+//! vehicles, and the lane arithmetic.
+//!
+//! The only files read here are a profile and the sources of its constants. Nothing is simulated here: the engine steps
+//! these definitions.
 
-use lanesweep_support::{Error, Place, Result, settings, support};
-
+pub mod assumptions;
+pub mod case;
+pub mod category;
+pub mod criterion;
 #[macro_use]
-#[path = "mod.rs"]
-pub mod model;
+pub mod driver;
+pub mod motion;
+pub mod profile;
+pub mod scalar;
 pub mod scenario;

@@ -1,7 +1,7 @@
 //! How another vehicle moves: a pure function of the step index, in a fixed-size record over shared tables. It has no
 //! closure and no accumulation; every backend decodes it alike.
 
-use crate::model::scalar::Real;
+use crate::scalar::Real;
 
 /// Speed along the road as the host describes it.
 #[derive(Debug, Clone, PartialEq)]

@@ -6,12 +6,12 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::model::criterion::CriteriaProfile;
-use crate::model::driver::{self, Bound, DriverProfile, ModelId};
-use crate::support::input_file;
-use crate::support::plain_text::nearest;
-use crate::support::ranges::refuse_repeats;
-use crate::{Error, Place, Result};
+use crate::criterion::CriteriaProfile;
+use crate::driver::{self, Bound, DriverProfile, ModelId};
+use lanesweep_support::input_file;
+use lanesweep_support::plain_text::nearest;
+use lanesweep_support::ranges::refuse_repeats;
+use lanesweep_support::{Error, Place, Result};
 
 /// Maximum number of steps of a run.
 pub const MAX_STEPS: f64 = 4e6;
@@ -272,8 +272,8 @@ impl Profile {
 mod tests {
     use super::*;
 
-    use crate::model::driver::ModelId;
-    use crate::support::plain_text::cut;
+    use crate::driver::ModelId;
+    use lanesweep_support::plain_text::cut;
     use serde_json::Value;
 
     #[test]

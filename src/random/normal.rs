@@ -257,7 +257,7 @@ mod tests {
 
     #[test]
     fn deviates_of_random_words_pass_kolmogorov_and_smirnov() {
-        let stream = crate::random::Stream { seed: 157, purpose: 1 };
+        let stream = crate::Stream { seed: 157, purpose: 1 };
         let mut z: Vec<f32> = (0..50_000).flat_map(|k| stream.words(k, 0)).map(standard_normal).collect();
         z.sort_by(f32::total_cmp);
         let n = z.len() as f64;

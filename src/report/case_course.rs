@@ -1,10 +1,10 @@
 //! The seconds of a case that its figures show, and the recorded motion of the other vehicles.
 
 use super::case_sheet::CaseSheet;
-use crate::engine::{StepMark, Trace, TracedStep, TracedVehicle};
-use crate::run::check::Subject;
-use crate::scenario::{GAP_ERROR_M, KMH};
-use crate::support::readable::value;
+use lanesweep_engine::{StepMark, Trace, TracedStep, TracedVehicle};
+use lanesweep_model::scenario::{GAP_ERROR_M, KMH};
+use lanesweep_run::check::Subject;
+use lanesweep_support::readable::value;
 
 /// Time shown after the last decisive event, s.
 const REST_S: f64 = 2.0;

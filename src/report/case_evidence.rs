@@ -8,15 +8,15 @@ use super::html::Section;
 use super::lanes::outcome_json;
 use super::records;
 use super::tables::{WIDTH, wrap};
-use crate::Result;
-use crate::engine::version::Canonical;
-use crate::engine::{ENGINE_VERSION, Outcome};
-use crate::model::assumptions::Assumption;
-use crate::model::profile::Profile;
-use crate::run::check::{Judged, Judgement, Subject};
-use crate::run::grid::{PARAMETERS, Perturbation};
-use crate::support::readable::value;
-use crate::support::table::{Column, NumberText, Table};
+use lanesweep_engine::version::Canonical;
+use lanesweep_engine::{ENGINE_VERSION, Outcome};
+use lanesweep_model::assumptions::Assumption;
+use lanesweep_model::profile::Profile;
+use lanesweep_run::check::{Judged, Judgement, Subject};
+use lanesweep_run::grid::{PARAMETERS, Perturbation};
+use lanesweep_support::Result;
+use lanesweep_support::readable::value;
+use lanesweep_support::table::{Column, NumberText, Table};
 
 impl CaseSheet<'_> {
     /// The numbers of the case by key, in SI units.

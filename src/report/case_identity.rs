@@ -2,10 +2,10 @@
 
 use super::html::Section;
 use super::records::PROGRAM;
-use crate::Result;
-use crate::engine::ENGINE_VERSION;
-use crate::engine::version::Canonical;
-use crate::model::profile::Profile;
+use lanesweep_engine::ENGINE_VERSION;
+use lanesweep_engine::version::Canonical;
+use lanesweep_model::profile::Profile;
+use lanesweep_support::Result;
 
 /// What no simulation of the program considers. The chapter for assessors has the same list.
 pub(super) const NOT_CONSIDERED: [(&str, &str); 9] = [

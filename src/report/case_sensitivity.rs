@@ -5,8 +5,8 @@ use serde_json::{Value, json};
 use super::case_sheet::CaseSheet;
 use super::html::Section;
 use super::tables::{WIDTH, wrap};
-use crate::run::check::{DriverRule, RuleVerdicts, Verdict};
-use crate::support::table::Table;
+use lanesweep_run::check::{DriverRule, RuleVerdicts, Verdict};
+use lanesweep_support::table::Table;
 
 /// What the columns of the rules show.
 const RULES: &str = "The verdict if this driver alone decides; if any of the reference drivers suffices (in force); if all of them \

@@ -1,11 +1,11 @@
 //! The leading sentences of a sheet: the case and its reading, the answer, and the demands of the cut-in clauses.
 
 use super::case_sheet::CaseSheet;
-use crate::model::driver::ModelId;
-use crate::run::check::{Answer, Demand, Holds, Judged, Judgement, Subject, Verdict};
-use crate::run::grid::VARIED;
-use crate::scenario::{CaseQuantity, Category, KMH, SPEED_ERROR_MPS};
-use crate::support::readable::{exact, value};
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::scenario::{CaseQuantity, Category, KMH, SPEED_ERROR_MPS};
+use lanesweep_run::check::{Answer, Demand, Holds, Judged, Judgement, Subject, Verdict};
+use lanesweep_run::grid::VARIED;
+use lanesweep_support::readable::{exact, value};
 
 /// The clause of a leader that brakes.
 pub(super) const CLAUSE_OF_LEADERS: &str = "UN R157, 5.2.5.1 still holds, whatever the drivers of Annex 3 do: the system has \

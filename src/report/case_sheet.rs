@@ -9,14 +9,14 @@ use super::lanes::outcome_json;
 use super::records::{self, PROGRAM};
 use super::tables::{WIDTH, wrap};
 use super::trace::{TraceFigure, TracePanels, TraceSeries};
-use crate::Result;
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
-use crate::run::check::{Boundary, Change, Judged, Judgement, Reading, RunEnd, Subject, Verdict};
-use crate::run::grid::VARIED;
-use crate::scenario::{CaseQuantity, KMH, NUMBERS};
-use crate::support::readable::value;
-use crate::support::table::{Column, NumberText, Table, json_number};
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scenario::{CaseQuantity, KMH, NUMBERS};
+use lanesweep_run::check::{Boundary, Change, Judged, Judgement, Reading, RunEnd, Subject, Verdict};
+use lanesweep_run::grid::VARIED;
+use lanesweep_support::Result;
+use lanesweep_support::readable::value;
+use lanesweep_support::table::{Column, NumberText, Table, json_number};
 
 /// What the columns of the drivers show.
 const DRIVERS: &str = "Smallest gap to a vehicle in the ego's path, smallest TTC, largest BTN. At a contact while the gap \

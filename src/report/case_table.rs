@@ -10,12 +10,12 @@ use super::case_sheet::{CaseSheet, verdict_of};
 use super::lanes::{outcome_cells, outcome_columns};
 use super::records::{self, PROGRAM};
 use super::tables::wrap;
-use crate::Result;
-use crate::engine::Trace;
-use crate::model::driver::ModelId;
-use crate::run::check::{Answer, CaseVerdicts, Demand, Judged, Judgement, RunEnd, Verdict};
-use crate::support::readable::counted;
-use crate::support::table::{Cell, Column, ColumnKind, Table, TableMetadata, TableOf};
+use lanesweep_engine::Trace;
+use lanesweep_model::driver::ModelId;
+use lanesweep_run::check::{Answer, CaseVerdicts, Demand, Judged, Judgement, RunEnd, Verdict};
+use lanesweep_support::Result;
+use lanesweep_support::readable::counted;
+use lanesweep_support::table::{Cell, Column, ColumnKind, Table, TableMetadata, TableOf};
 
 /// All verdicts, the worst first: those without a driver of Annex 3 that avoids the collision, then those with one, then
 /// those without a collision.
@@ -287,7 +287,7 @@ impl CaseAnswers {
     /// Writes the rows as a table: CSV, JSON Lines or Parquet, by the ending of the name.
     ///
     /// # Errors
-    /// [`Error::Io`](crate::Error::Io), and for an unknown ending.
+    /// [`Error::Io`](lanesweep_support::Error::Io), and for an unknown ending.
     pub fn save(&self, path: &Path) -> Result<()> {
         let metadata =
             TableMetadata { table: "cases", profile: Some(self.profile.clone()), ..TableMetadata::default() };

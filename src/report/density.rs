@@ -2,9 +2,9 @@
 
 use std::fmt::Write;
 
-use crate::stats::density::{DensityModel, Exposure, Rate, Refused, SearchEnd, ValidFraction, standard_deviation};
-use crate::support::readable::{count, count_of, significant};
-use crate::support::table::{Column, Digits, Table};
+use lanesweep_stats::density::{DensityModel, Exposure, Rate, Refused, SearchEnd, ValidFraction, standard_deviation};
+use lanesweep_support::readable::{count, count_of, significant};
+use lanesweep_support::table::{Column, Digits, Table};
 
 /// One density without its kernels.
 pub fn text(model: &DensityModel) -> String {

@@ -6,9 +6,9 @@ use serde::Serialize;
 
 use super::case_identity::program;
 use super::html::Section;
-use crate::engine::{DeviceRecord, OpenBackend, SweepSummary};
-use crate::model::profile::Profile;
-use crate::support::readable::{count, counted};
+use lanesweep_engine::{DeviceRecord, OpenBackend, SweepSummary};
+use lanesweep_model::profile::Profile;
+use lanesweep_support::readable::{count, counted};
 
 /// Facts about the machine.
 #[derive(Debug, Clone, Serialize)]

@@ -9,10 +9,10 @@ use sha2::{Digest, Sha256};
 
 use super::plot::Figure;
 use super::records::PROGRAM;
-use crate::Result;
-use crate::support::plain_text::shown;
-use crate::support::run_folder::Results;
-use crate::support::table::Table;
+use lanesweep_support::Result;
+use lanesweep_support::plain_text::shown;
+use lanesweep_support::run_folder::Results;
+use lanesweep_support::table::Table;
 
 const STYLE: &str = include_str!("templates/style.css");
 const SCRIPT: &str = include_str!("templates/script.js");
@@ -306,7 +306,7 @@ fn inline(svg: &str) -> (String, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::support::table::NumberText;
+    use lanesweep_support::table::NumberText;
 
     fn page() -> Page {
         let table = Table::of([("<script>alert(1)</script>\u{202e}\u{1b}", "1\n[0 2]")])

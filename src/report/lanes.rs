@@ -2,16 +2,16 @@
 
 use std::path::Path;
 
-use crate::engine::{Chunk, Headway, LanePlan, Outcome};
-use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
-use crate::report::records::{at_contact, smallest_gap_m, time_s};
-use crate::run::sampling::{FailingLane, Sample};
-use crate::run::study::{Study, robust_lanes};
-use crate::stats::density::DensityModel;
-use crate::support::files::make_folder_of;
-use crate::support::table::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter, json_value};
-use crate::{Error, Result};
+use crate::records::{at_contact, smallest_gap_m, time_s};
+use lanesweep_engine::{Chunk, Headway, LanePlan, Outcome};
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::ModelId;
+use lanesweep_run::sampling::{FailingLane, Sample};
+use lanesweep_run::study::{Study, robust_lanes};
+use lanesweep_stats::density::DensityModel;
+use lanesweep_support::files::make_folder_of;
+use lanesweep_support::table::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter, json_value};
+use lanesweep_support::{Error, Result};
 
 /// A table for the lanes of a study; see [`write_study_chunk`]. It is written chunk by chunk, so that memory does not
 /// grow with the lanes.
@@ -141,7 +141,7 @@ pub fn outcome_json(outcome: &Outcome<f64>, dt_s: f64) -> serde_json::Value {
     OUTCOME.iter().map(|&(name, .., of)| (name.to_owned(), value(of))).collect()
 }
 
-/// The columns of [concrete cases](crate::run::cases), in their order.
+/// The columns of [concrete cases](lanesweep_run::cases), in their order.
 #[rustfmt::skip] // a table: one line per column
 pub fn case_columns() -> Vec<Column> {
     let c = Column::new;

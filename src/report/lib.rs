@@ -1,11 +1,38 @@
-//! Tables, figures, pages and exported scenarios. The rooms that its modules may use stand below; `lanesweep` is the crate for users.
+//! Reports: the output of a run for people and for other programs.
+//!
+//! This module holds the terminal tables, the CSV files, the figures (SVG, all drawn by `plot`), the pages and
+//! `run.json`. It computes nothing beyond formatting. Scores come from [`lanesweep_run::score`]; text and files go to the
+//! user.
 
-use lanesweep_engine::engine;
-use lanesweep_model::{model, scenario};
-use lanesweep_run::run;
-use lanesweep_stats::stats;
-use lanesweep_support::{Error, Place, Result, support};
-use lanesweep_traffic::traffic;
-
-#[path = "mod.rs"]
-pub mod report;
+mod case_course;
+mod case_evidence;
+pub mod case_identity;
+mod case_sensitivity;
+mod case_sentences;
+pub mod case_sheet;
+pub mod case_table;
+pub mod density;
+mod dots;
+pub mod host;
+mod html;
+pub mod lanes;
+pub mod map;
+mod map_record;
+mod map_sheet;
+mod map_tables;
+pub mod openscenario;
+mod plot;
+pub mod records;
+pub mod sampling;
+mod sampling_figures;
+mod sampling_files;
+mod sampling_page;
+pub mod sampling_tables;
+pub mod study;
+mod study_answer;
+mod study_figures;
+mod study_page;
+pub mod tables;
+pub mod trace;
+pub mod tracks;
+pub mod verification;

@@ -4,12 +4,12 @@ use super::host::{Host, SweepRecord};
 use super::html::{Page, PageFigure, Section};
 use super::map_sheet::MapSheet;
 use super::records::publish;
-use crate::Result;
-use crate::model::criterion::Criterion;
-use crate::model::profile::Profile;
-use crate::run::grid::{CaseStyle, CellOutcome, MappedGrid};
-use crate::support::readable::count;
-use crate::support::run_folder::{ResultFiles, Results};
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::profile::Profile;
+use lanesweep_run::grid::{CaseStyle, CellOutcome, MappedGrid};
+use lanesweep_support::Result;
+use lanesweep_support::readable::count;
+use lanesweep_support::run_folder::{ResultFiles, Results};
 
 /// A complete run.
 pub struct MapReport {
@@ -41,7 +41,7 @@ impl MapReport {
     /// Writes every file to the folder; returns their names without the record's.
     ///
     /// # Errors
-    /// [`crate::Error::Io`] if the folder cannot be written to.
+    /// [`lanesweep_support::Error::Io`] if the folder cannot be written to.
     pub fn write(&self, mut results: Results) -> Result<ResultFiles> {
         let mut figures = Vec::new();
         let outcomes = self.shown_outcomes();

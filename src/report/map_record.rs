@@ -6,10 +6,10 @@ use serde::Serialize;
 
 use super::map::MapReport;
 use super::records::{PROGRAM, document, record};
-use crate::Result;
-use crate::engine::ENGINE_VERSION;
-use crate::run::grid::{CellOutcome, GridAxis, MappedGrid};
-use crate::support::run_folder::ResultFiles;
+use lanesweep_engine::ENGINE_VERSION;
+use lanesweep_run::grid::{CellOutcome, GridAxis, MappedGrid};
+use lanesweep_support::Result;
+use lanesweep_support::run_folder::ResultFiles;
 
 impl MapReport {
     /// `map.json`: fractions and everything needed to reproduce them; `files` are in the same folder.

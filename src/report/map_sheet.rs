@@ -5,8 +5,8 @@
 //! them.
 
 use super::plot::{Cells, Figure, FilledCell, Height, INK, Plot, PlotAxis, Rule};
-use crate::run::check::Answer;
-use crate::run::grid::{CellOutcome, Grid, boundary, runs};
+use lanesweep_run::check::Answer;
+use lanesweep_run::grid::{CellOutcome, Grid, boundary, runs};
 
 /// A sheet.
 pub(super) struct MapSheet<'a> {

@@ -4,12 +4,12 @@ use std::io::{self, Write};
 
 use super::case_sentences::CLAUSE_OF_LEADERS;
 use super::map::MapReport;
-use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
-use crate::run::grid::{CaseQuantity, CellOutcome, MappedGrid, VARIED};
-use crate::scenario::Category;
-use crate::support::readable;
-use crate::support::table::{Column, Digits, NumberText, Table};
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::scenario::Category;
+use lanesweep_run::grid::{CaseQuantity, CellOutcome, MappedGrid, VARIED};
+use lanesweep_support::readable;
+use lanesweep_support::table::{Column, Digits, NumberText, Table};
 
 impl MapReport {
     /// Fractions as a table.

@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use crate::engine::{NO_STEP, Outcome};
-use crate::support::run_folder::{ResultFiles, Results};
-use crate::{Error, Result};
+use lanesweep_engine::{NO_STEP, Outcome};
+use lanesweep_support::run_folder::{ResultFiles, Results};
+use lanesweep_support::{Error, Result};
 
 /// Program and version.
 pub(super) const PROGRAM: &str = concat!("lanesweep ", env!("CARGO_PKG_VERSION"));

@@ -7,17 +7,17 @@ use serde::Serialize;
 use super::host::Host;
 use super::records::{PROGRAM, document, record};
 use super::tables::paragraph;
-use crate::Result;
-use crate::engine::generated::ATTEMPTS;
-use crate::engine::{ENGINE_VERSION, Headway, LanePlan, SampleTally};
-use crate::model::profile::Profile;
-use crate::run::sampling::{EstimateRow, RiskRate, SampleOptions};
-use crate::scenario::Category;
-use crate::stats::density::{DensityModel, Provenance};
-use crate::stats::estimate::{IntervalKind, SearchRound, StopReason, WeightFigures};
-use crate::support::readable::{count, count_of, significant, value};
-use crate::support::run_folder::ResultFiles;
-use crate::support::table::{Column, Digits, NumberText, Table, TableOf};
+use lanesweep_engine::generated::ATTEMPTS;
+use lanesweep_engine::{ENGINE_VERSION, Headway, LanePlan, SampleTally};
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scenario::Category;
+use lanesweep_run::sampling::{EstimateRow, RiskRate, SampleOptions};
+use lanesweep_stats::density::{DensityModel, Provenance};
+use lanesweep_stats::estimate::{IntervalKind, SearchRound, StopReason, WeightFigures};
+use lanesweep_support::Result;
+use lanesweep_support::readable::{count, count_of, significant, value};
+use lanesweep_support::run_folder::ResultFiles;
+use lanesweep_support::table::{Column, Digits, NumberText, Table, TableOf};
 
 /// The density of a run.
 #[derive(Debug, Clone, Serialize)]

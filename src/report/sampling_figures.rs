@@ -3,10 +3,10 @@
 //! an estimate of zero: its interval's upper end is drawn instead, with an arrow downwards.
 
 use super::plot::{AxisScale, Figure, Mark, Plot, PlotAxis, Series, Value, is_few, logarithmic_reach, number};
-use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
-use crate::run::sampling::{Checkpoint, CheckpointRow};
-use crate::stats::density::DensityModel;
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::ModelId;
+use lanesweep_run::sampling::{Checkpoint, CheckpointRow};
+use lanesweep_stats::density::DensityModel;
 
 /// The sampled density, for the line below a heading.
 fn sampled(density: &DensityModel) -> String {

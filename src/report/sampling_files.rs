@@ -6,10 +6,10 @@ use super::records::publish;
 use super::sampling::{DensityRecord, DrawRecord, SampleReport};
 use super::sampling_figures::convergence;
 use super::sampling_tables::convergence_csv;
-use crate::Result;
-use crate::engine::Headway;
-use crate::run::sampling::{Sample, SampleResult, proposal_text};
-use crate::support::run_folder::{ResultFiles, Results};
+use lanesweep_engine::Headway;
+use lanesweep_run::sampling::{Sample, SampleResult, proposal_text};
+use lanesweep_support::Result;
+use lanesweep_support::run_folder::{ResultFiles, Results};
 
 impl SampleReport {
     /// From a run and its result.
@@ -39,7 +39,7 @@ impl SampleReport {
     /// Writes every file of the run to its folder, the record last; returns the names of the others.
     ///
     /// # Errors
-    /// [`crate::Error::Io`].
+    /// [`lanesweep_support::Error::Io`].
     pub fn write(&self, mut results: Results, sample: &Sample, result: &SampleResult) -> Result<ResultFiles> {
         let (density, mut figures) = (&sample.density, Vec::new());
         if let Some(run) = &result.crude {

@@ -3,11 +3,11 @@
 use super::html::{Page, PageFigure, Section};
 use super::plot::{AxisScale, Figure, Mark, Plot, PlotAxis, Series, Value, is_few};
 use super::sampling::SampleReport;
-use crate::engine::Headway;
-use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
-use crate::run::sampling::EstimateRow;
-use crate::support::readable::{count, count_of, value};
+use lanesweep_engine::Headway;
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::ModelId;
+use lanesweep_run::sampling::EstimateRow;
+use lanesweep_support::readable::{count, count_of, value};
 
 impl SampleReport {
     /// `report.html`, with the figures of the run.

@@ -4,10 +4,10 @@
 use serde::Serialize;
 
 use super::sampling::{SampleReport, short};
-use crate::run::sampling::{Checkpoint, EstimateRow, RiskRate, TRAFFIC_DRAWS, Uncertainty};
-use crate::stats::estimate::{Ratio, Warning, WeightFigures};
-use crate::support::readable::{count, count_of, counted, significant};
-use crate::support::table::{NamedValue, Table};
+use lanesweep_run::sampling::{Checkpoint, EstimateRow, RiskRate, TRAFFIC_DRAWS, Uncertainty};
+use lanesweep_stats::estimate::{Ratio, Warning, WeightFigures};
+use lanesweep_support::readable::{count, count_of, counted, significant};
+use lanesweep_support::table::{NamedValue, Table};
 
 impl SampleReport {
     /// `estimates.csv`.

@@ -9,16 +9,16 @@ use super::study_figures::{
     distributions, f1_by_parameters, f1_intervals, headways, modes, radar, recall_and_precision,
 };
 use super::tables;
-use crate::Result;
-use crate::engine::{ENGINE_VERSION, Headway, Partial, SweepSummary};
-use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
-use crate::run::score::{Best, CategoryScores, Misfit, ScoreTable, f1, published_failures, published_lvd_f1};
-use crate::run::study::{ReferenceComparison, Study, StudyEvaluation, StudyProvenance};
-use crate::scenario::Category;
-use crate::scenario::parameterization::Parameterization;
-use crate::support::run_folder::{ResultFiles, Results};
-use crate::support::table::{Column, Digits, Table};
+use lanesweep_engine::{ENGINE_VERSION, Headway, Partial, SweepSummary};
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::scenario::Category;
+use lanesweep_model::scenario::parameterization::Parameterization;
+use lanesweep_run::score::{Best, CategoryScores, Misfit, ScoreTable, f1, published_failures, published_lvd_f1};
+use lanesweep_run::study::{ReferenceComparison, Study, StudyEvaluation, StudyProvenance};
+use lanesweep_support::Result;
+use lanesweep_support::run_folder::{ResultFiles, Results};
+use lanesweep_support::table::{Column, Digits, Table};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -103,7 +103,7 @@ impl<'a> StudyReport<'a> {
     /// without the record's.
     ///
     /// # Errors
-    /// [`crate::Error::Io`].
+    /// [`lanesweep_support::Error::Io`].
     pub fn write(&self, mut results: Results) -> Result<ResultFiles> {
         let data = if self.facts().synthetic { "synthetic" } else { "recorded" };
         results.add("failures.csv", tables::failure_records(&self.evaluation.scores, data)?.csv().as_bytes())?;

@@ -5,9 +5,9 @@ use super::html::Section;
 use super::study::StudyReport;
 use super::study_figures::variant_name;
 use super::tables::{reference_text, wrap};
-use crate::run::score::Best;
-use crate::support::readable::{count, count_of, counted};
-use crate::support::table::{NumberText, Table};
+use lanesweep_run::score::Best;
+use lanesweep_support::readable::{count, count_of, counted};
+use lanesweep_support::table::{NumberText, Table};
 
 /// Width of the screen in columns, and minimum width of a narrower one.
 const WIDTH: usize = 80;

@@ -6,17 +6,17 @@ use super::plot::{
     AxisScale, Figure, GREY, INK, Look, Mark, Name, Plot, PlotAxis, Rule, Series, Symbol, Value, is_few, number,
     quantity,
 };
-use crate::engine::Headway;
-use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
-use crate::run::score::{
+use lanesweep_engine::Headway;
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::scenario::Category;
+use lanesweep_model::scenario::parameterization::{ModeShape, Parameterization};
+use lanesweep_run::score::{
     CROSS_VALIDATED, CategoryScores, HeadwayFailures, MeanF1, ScoreInterval, equal_f1, f1, pareto_front, precision,
     recall,
 };
-use crate::run::study::ParameterHistogram;
-use crate::scenario::Category;
-use crate::scenario::parameterization::{ModeShape, Parameterization};
-use crate::stats::estimate::wilson;
+use lanesweep_run::study::ParameterHistogram;
+use lanesweep_stats::estimate::wilson;
 
 /// Fraction of the scenarios that fail, over the headway: S with its interval, beside it every S'; a panel per model
 /// and criterion. `None` with fewer than two headways that are the same for all scenarios.

@@ -4,11 +4,11 @@ use super::host::Timings;
 use super::html::{Page, PageFigure, Section};
 use super::study::StudyReport;
 use super::tables;
-use crate::run::score::{CategoryScores, ClaimVerdict, Misfit};
-use crate::scenario::parameterization::Parameterization;
-use crate::support::readable::{count, value};
-use crate::support::table::Table;
-use crate::traffic::mining::RecordingSummary;
+use lanesweep_model::scenario::parameterization::Parameterization;
+use lanesweep_run::score::{CategoryScores, ClaimVerdict, Misfit};
+use lanesweep_support::readable::{count, value};
+use lanesweep_support::table::Table;
+use lanesweep_traffic::mining::RecordingSummary;
 
 /// Maximum number of recordings listed; the rest are in `run.json`.
 const MAX_RECORDINGS: usize = 200;

@@ -1,16 +1,16 @@
 //! The tables of a study: for people in the paper's layout, for files with one row per number.
 
-use crate::model::criterion::Criterion;
-use crate::run::score::{
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::scenario::parameterization::Parameterization;
+use lanesweep_run::score::{
     CategoryScores, ClaimResult, ClaimVerdict, PublishedFailures, ScoreCell, ScoreInterval, ScoreTable, f1, precision,
     published_failures, published_lvd_f1, recall,
 };
-use crate::run::study::ReferenceComparison;
-use crate::scenario::parameterization::Parameterization;
-use crate::support::readable;
-pub use crate::support::table::WIDTH;
-use crate::support::table::{Column, Digits, NumberText, Table};
-use crate::{Error, Result};
+use lanesweep_run::study::ReferenceComparison;
+use lanesweep_support::readable;
+pub use lanesweep_support::table::WIDTH;
+use lanesweep_support::table::{Column, Digits, NumberText, Table};
+use lanesweep_support::{Error, Result};
 
 /// Failures of S per category, model and criterion, as in the paper's table. With `published`, the fractions of
 /// collision, TTC and BTN and the published ones.
@@ -256,10 +256,10 @@ pub fn wrap(text: &str, width: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::{Confusion, Headway};
-    use crate::model::driver::ModelId;
-    use crate::run::score::ScoreOptions;
-    use crate::scenario::Category;
+    use lanesweep_engine::{Confusion, Headway};
+    use lanesweep_model::driver::ModelId;
+    use lanesweep_model::scenario::Category;
+    use lanesweep_run::score::ScoreOptions;
 
     fn scores(capped: Vec<u64>) -> ScoreTable {
         let cell = |model, criterion| {

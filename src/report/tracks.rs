@@ -6,11 +6,11 @@ use serde::Serialize;
 
 use super::plot::{Figure, Plot, PlotAxis, Rule};
 use super::tables::wrap;
-use crate::support::readable::count_of;
-use crate::support::table::WIDTH;
-use crate::traffic::mining::{CategoryCount, counts_text};
-use crate::traffic::trajectory::tracks::Understanding;
-use crate::traffic::trajectory::{Recording, Track, VehicleClass};
+use lanesweep_support::readable::count_of;
+use lanesweep_support::table::WIDTH;
+use lanesweep_traffic::mining::{CategoryCount, counts_text};
+use lanesweep_traffic::trajectory::tracks::Understanding;
+use lanesweep_traffic::trajectory::{Recording, Track, VehicleClass};
 
 /// Maximum number of tracks of a carriageway that are drawn; beyond it, every n-th is.
 const MAX_TRACKS: usize = 400;

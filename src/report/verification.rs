@@ -2,12 +2,12 @@
 
 use std::fmt::Write;
 
-use crate::engine::verify::{Comparison, DifferingLane, GroupComparison, WORDS};
-use crate::engine::{Outcome, words};
-use crate::model::criterion::Criterion;
-use crate::report::lanes::outcome_json;
-use crate::support::readable::{count, value};
-use crate::support::table::{NumberText, Table};
+use crate::lanes::outcome_json;
+use lanesweep_engine::verify::{Comparison, DifferingLane, GroupComparison, WORDS};
+use lanesweep_engine::{Outcome, words};
+use lanesweep_model::criterion::Criterion;
+use lanesweep_support::readable::{count, value};
+use lanesweep_support::table::{NumberText, Table};
 
 /// One set of lanes: what was compared per category and model, and the differences.
 pub fn comparison(comparison: &Comparison) -> String {

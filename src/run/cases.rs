@@ -3,14 +3,14 @@
 
 use std::sync::Arc;
 
-use crate::engine::{
+use lanesweep_engine::{
     Block, CaseTable, Chunk, EncodedBlock, Executor, Headway, LaneCase, LanePlan, Outcome, Start, Units, Wanted,
 };
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
-use crate::scenario::{CaseParameters, Category, Tables};
-use crate::support::plausibility::{Doubts, Implausible};
-use crate::{Error, Place, Result};
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scenario::{CaseParameters, Category, Tables};
+use lanesweep_support::plausibility::{Doubts, Implausible};
+use lanesweep_support::{Error, Place, Result};
 
 /// Name of the only variant.
 const VARIANT: &str = "case";
@@ -175,8 +175,8 @@ fn of_row(row: u64, error: Error) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::{CpuBackend, Trace};
-    use crate::model::criterion::Criterion;
+    use lanesweep_engine::{CpuBackend, Trace};
+    use lanesweep_model::criterion::Criterion;
 
     fn row(category: &str, ego_speed: f64, gap: Option<f64>) -> CaseParameters {
         CaseParameters {

@@ -4,16 +4,18 @@ use sha2::{Digest, Sha256};
 
 use super::sampling::{SAMPLE_PURPOSE, generator_of};
 use super::study::plan_file::{BlockHead, StudyHead, stripped};
-use crate::engine::ENGINE_VERSION;
-use crate::engine::verify::{SetOptions, random_plan, threshold_plan};
-use crate::engine::{Backend, Constants, CpuBackend, Headway, LanePlan, Outcome, Silent, Start, Wanted, words};
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
-use crate::random::Stream;
-use crate::scenario::parameterization::{Parameterization, ParameterizationOptions, Reduction, Sizes, SvdBasis};
-use crate::scenario::{Category, Scenario, Tables};
-use crate::stats::density::{Bandwidth, BandwidthRule, Kde, ParameterSpace, SearchEnd};
-use crate::support::plain_text::hex;
+use lanesweep_engine::ENGINE_VERSION;
+use lanesweep_engine::verify::{SetOptions, random_plan, threshold_plan};
+use lanesweep_engine::{Backend, Constants, CpuBackend, Headway, LanePlan, Outcome, Silent, Start, Wanted, words};
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scenario::parameterization::{
+    Parameterization, ParameterizationOptions, Reduction, Sizes, SvdBasis,
+};
+use lanesweep_model::scenario::{Category, Scenario, Tables};
+use lanesweep_random::Stream;
+use lanesweep_stats::density::{Bandwidth, BandwidthRule, Kde, ParameterSpace, SearchEnd};
+use lanesweep_support::plain_text::hex;
 
 /// A version, and the SHA-256 of a small set of lanes computed with it: of the words up to [`MEASURES`], and of the
 /// others, which were added later. A test uses them to detect that [`ENGINE_VERSION`] must be raised.

@@ -1,8 +1,8 @@
-//! Densities of scenario parameters, estimators and intervals. The rooms that its modules may use stand below; `lanesweep` is the crate for users.
+//! Statistics: random numbers, densities of scenario parameters, estimators of rare events and their intervals.
+//!
+//! Nothing here steps a lane: estimators ask a limit state, which the run answers with lanes.
 
-use lanesweep_model::scenario;
-use lanesweep_random::random;
-use lanesweep_support::{Error, Place, Result, support};
+pub mod density;
+pub mod estimate;
 
-#[path = "mod.rs"]
-pub mod stats;
+pub use lanesweep_random as random;

@@ -7,7 +7,7 @@ use std::fmt;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use crate::support::plain_text::{MAX_PATH, cut, cut_names, shown_in_line};
+use crate::plain_text::{MAX_PATH, cut, cut_names, shown_in_line};
 
 /// Result of everything in this library that can fail on a user's input.
 pub type Result<T> = std::result::Result<T, Error>;

@@ -3,8 +3,8 @@
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 
-use crate::support::atomic_file::{AtomicFile, folder_of};
-use crate::support::input_file::claim_output;
+use crate::atomic_file::{AtomicFile, folder_of};
+use crate::input_file::claim_output;
 use crate::{Error, Place, Result};
 
 /// Checks that a folder exists or could be created; it only inspects names, before the work starts.

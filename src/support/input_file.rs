@@ -13,8 +13,8 @@ use flate2::read::MultiGzDecoder;
 use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
 
-use crate::support::atomic_file::folder_of;
-use crate::support::plain_text::{cut_names, hex, nearest};
+use crate::atomic_file::folder_of;
+use crate::plain_text::{cut_names, hex, nearest};
 use crate::{Error, Place, Result};
 
 /// Maximum size of a settings file (configurations, profiles, exposures), bytes; those that the program writes have a

@@ -1,6 +1,20 @@
-//! Errors, files, tables and locks. The rooms that its modules may use stand below; `lanesweep` is the crate for users.
+//! Support that is independent of traffic: errors, files, tables, locks, and texts and numbers for people.
+//!
+//! This module holds the error type, atomic files, run directories and their locks, tables in three formats, ranges of
+//! settings, and plausibility of input. All other modules may use it; it uses none of them.
 
-#[path = "mod.rs"]
-pub mod support;
+pub mod atomic_file;
+pub mod cancel;
+pub mod error;
+pub mod files;
+pub mod input_file;
+pub mod lock;
+pub mod plain_text;
+pub mod plausibility;
+pub mod ranges;
+pub mod readable;
+pub mod run_folder;
+pub mod table;
+pub mod vector_state;
 
-pub use support::error::{Error, Place, Result};
+pub use error::{Error, Place, Result};

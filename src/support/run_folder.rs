@@ -14,11 +14,11 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::support::atomic_file::folder_of;
-use crate::support::atomic_file::{AtomicFile, Live, StagedFile, clear_stale, refuse_link, sync_folder};
-use crate::support::files::{file_name, make_folder, remove_file, write_inside};
-use crate::support::input_file;
-use crate::support::lock::FolderLock;
+use crate::atomic_file::folder_of;
+use crate::atomic_file::{AtomicFile, Live, StagedFile, clear_stale, refuse_link, sync_folder};
+use crate::files::{file_name, make_folder, remove_file, write_inside};
+use crate::input_file;
+use crate::lock::FolderLock;
 use crate::{Error, Place, Result};
 
 /// Record of a study.

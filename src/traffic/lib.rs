@@ -1,7 +1,11 @@
-//! Recordings, generated traffic and the mining of scenarios. The rooms that its modules may use stand below; `lanesweep` is the crate for users.
+//! Traffic: recordings as read, and the scenarios found in them.
+//!
+//! [`trajectory`] reads recordings (highD's format) and generates synthetic ones; [`mining`] finds cut-ins, cut-outs
+//! and leader decelerations. A [`Source`] loads and mines either, or reads a scenario file. Scenarios go to
+//! [`scenario`](lanesweep_model::scenario).
 
-use lanesweep_model::scenario;
-use lanesweep_support::{Error, Place, Result, settings, support};
+pub mod mining;
+mod provenance;
+pub mod trajectory;
 
-#[path = "mod.rs"]
-pub mod traffic;
+pub use provenance::Source;

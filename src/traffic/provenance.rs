@@ -13,11 +13,11 @@ use super::mining::{
 use super::trajectory::Inputs;
 use super::trajectory::generator::GeneratorOptions;
 use super::trajectory::highd::made_up;
-use crate::Result;
-use crate::scenario::{DataProvenance, Driven, ScenarioFile, read_scenario_file, write_scenarios_to};
-use crate::support::input_file;
-use crate::support::plain_text::hex;
-use crate::support::plausibility::Implausible;
+use lanesweep_model::scenario::{DataProvenance, Driven, ScenarioFile, read_scenario_file, write_scenarios_to};
+use lanesweep_support::Result;
+use lanesweep_support::input_file;
+use lanesweep_support::plain_text::hex;
+use lanesweep_support::plausibility::Implausible;
 
 /// Source of scenarios.
 #[derive(Debug, Clone, PartialEq)]
@@ -73,7 +73,7 @@ impl Source {
     /// ends the work.
     ///
     /// # Errors
-    /// [`Error::Io`](crate::support::error::Error::Io); [`Error::Input`](crate::support::error::Error::Input) if nothing can be read; [`Error::Usage`](crate::support::error::Error::Usage) for options out of range; that of `done`.
+    /// [`Error::Io`](lanesweep_support::error::Error::Io); [`Error::Input`](lanesweep_support::error::Error::Input) if nothing can be read; [`Error::Usage`](lanesweep_support::error::Error::Usage) for options out of range; that of `done`.
     pub fn load(
         &self,
         mining: &MiningOptions,
@@ -101,7 +101,7 @@ impl Source {
     /// values: hours of one data set must not mix with kilometres of another.
     ///
     /// # Errors
-    /// [`Error::Io`](crate::support::error::Error::Io); as [`DataProvenance::read_beside`].
+    /// [`Error::Io`](lanesweep_support::error::Error::Io); as [`DataProvenance::read_beside`].
     pub fn provenance(&self, collection: &Collection, given: Driven) -> Result<DataProvenance> {
         let mut provenance = DataProvenance {
             data: self.describe(collection.synthetic),
@@ -125,7 +125,7 @@ impl Source {
     /// scenarios have the same checksum.
     ///
     /// # Errors
-    /// [`Error::Io`](crate::support::error::Error::Io).
+    /// [`Error::Io`](lanesweep_support::error::Error::Io).
     pub fn scenarios_sha256(&self, collection: &Collection) -> Result<String> {
         if let Source::Scenarios { path, .. } = self {
             return input_file::sha256(path);

@@ -28,6 +28,21 @@ fn s_prime_of_other_programs_and_of_bases_of_other_folds_are_scored() {
         let variants = std::fs::read_to_string(of("parquet/variants.csv")).unwrap();
         assert!(variants.contains("lvd,as-parquet,0,1,1,1"), "{variants}");
     }
+    // Rows moved by one: S' of one scenario has the id of the next.
+    let lines = std::fs::read_to_string(of("scenarios.jsonl")).unwrap();
+    let rows = || lines.lines().skip(1).map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+    let cut_ins: Vec<_> = rows().filter(|row| row["category"] == "cut_in" && row["kept"] == true).collect();
+    let moved = cut_ins.iter().zip(cut_ins.iter().cycle().skip(1)).map(|(own, other)| {
+        let mut row = other.clone();
+        row["id"] = own["id"].clone();
+        format!("{row}\n")
+    });
+    let header = lines.lines().next().unwrap();
+    std::fs::write(of("moved.jsonl"), format!("{header}\n{}", moved.collect::<String>())).unwrap();
+    let warned = |name: &str| {
+        said(dir.path(), &format!("{} {name} --categories cut-in --out ids", &study[3..])).1.contains("check the ids")
+    };
+    assert!(warned("moved.jsonl") && !warned("scenarios.jsonl"));
     // What is wrong is said.
     let scenarios = read_scenario_file(&of("scenarios.jsonl"), Implausible::Refused).unwrap().scenarios;
     let id = &scenarios.iter().find(|s| s.kept && s.category == Category::CutIn).unwrap().id;

@@ -7,9 +7,9 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::keys::{Key, from_toml, nearest};
-use crate::support::input_file;
-use crate::support::plain_text::cut;
-use crate::{Error, Place, Result};
+use lanesweep_support::input_file;
+use lanesweep_support::plain_text::cut;
+use lanesweep_support::{Error, Place, Result};
 
 /// Maximum length of a key with its tables, bytes.
 const MAX_KEY_BYTES: usize = 200;

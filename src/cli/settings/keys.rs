@@ -6,10 +6,10 @@ use serde_json::{Number, Value};
 use toml::de::DeValue;
 
 use super::schema::settings_schema;
-use crate::cli::arguments::Value as Given;
-use crate::support::plain_text;
-use crate::support::ranges::Range;
-use crate::{Error, Place, Result};
+use crate::arguments::Value as Given;
+use lanesweep_support::plain_text;
+use lanesweep_support::ranges::Range;
+use lanesweep_support::{Error, Place, Result};
 
 /// One key with its type, range and default.
 #[derive(Debug, Clone, PartialEq)]
@@ -262,8 +262,8 @@ fn names(text: &str) -> Vec<String> {
 mod tests {
     use super::super::{KeyKind, Layers, Settings, file};
     use super::*;
-    use crate::Place;
-    use crate::support::ranges::Range;
+    use lanesweep_support::Place;
+    use lanesweep_support::ranges::Range;
 
     #[test]
     fn the_file_that_ships_is_the_defaults_and_names_every_key_once() {

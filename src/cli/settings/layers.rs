@@ -9,8 +9,8 @@ use serde_json::{Map, Value};
 
 use super::keys::{Key, KeyKind, from_value, from_word, keys_in_order};
 use super::{Settings, file};
-use crate::cli::arguments::Value as Given;
-use crate::{Error, Place, Result};
+use crate::arguments::Value as Given;
+use lanesweep_support::{Error, Place, Result};
 
 /// Source of a value; a later one overrides an earlier one.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]

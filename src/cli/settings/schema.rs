@@ -4,11 +4,11 @@
 use serde_json::{Map, Value, json};
 
 use super::Settings;
-use crate::model::assumptions::Constant;
-use crate::model::driver::Bound;
-use crate::model::profile::Profile;
-use crate::support::ranges;
-use crate::{Error, Result};
+use lanesweep_model::assumptions::Constant;
+use lanesweep_model::driver::Bound;
+use lanesweep_model::profile::Profile;
+use lanesweep_support::ranges;
+use lanesweep_support::{Error, Result};
 
 /// JSON Schema (draft 2020-12) of a configuration file.
 pub(crate) fn settings_schema() -> Value {

@@ -3,15 +3,15 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::engine::BackendChoice;
-use crate::model::criterion::Criterion;
-use crate::model::driver::Bound;
-use crate::run::score::ScoreOptions;
-use crate::scenario::parameterization::{ParameterizationOptions, SvdLateral};
-use crate::settings;
-use crate::stats::density::{BandwidthRule, FitOptions};
-use crate::traffic::mining::MiningOptions;
-use crate::traffic::trajectory::generator::GeneratorOptions;
+use lanesweep_engine::BackendChoice;
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::Bound;
+use lanesweep_model::scenario::parameterization::{ParameterizationOptions, SvdLateral};
+use lanesweep_run::score::ScoreOptions;
+use lanesweep_stats::density::{BandwidthRule, FitOptions};
+use lanesweep_support::settings;
+use lanesweep_traffic::mining::MiningOptions;
+use lanesweep_traffic::trajectory::generator::GeneratorOptions;
 
 /// Everything that may be set.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]

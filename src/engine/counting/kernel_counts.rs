@@ -4,10 +4,10 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::engine::backend::Chunk;
-use crate::engine::outcome::Verdicts;
-use crate::engine::plan::LanePlan;
-use crate::model::criterion::Criterion;
+use crate::backend::Chunk;
+use crate::outcome::Verdicts;
+use crate::plan::LanePlan;
+use lanesweep_model::criterion::Criterion;
 
 /// Maximum number of groups of kernels: kernel k counts in group k mod 512. With fewer kernels, each is a group. With
 /// more kernels, groups vary as much as kernels do, and a journal stays small.

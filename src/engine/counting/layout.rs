@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use super::KernelCounts;
-use crate::engine::outcome::Verdicts;
-use crate::engine::plan::LanePlan;
-use crate::model::criterion::Criterion;
+use crate::outcome::Verdicts;
+use crate::plan::LanePlan;
+use lanesweep_model::criterion::Criterion;
 
 /// Places of the counts: voids, tries, then the lists.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -86,7 +86,7 @@ impl CountLayout {
 
 /// Verdict words of consecutive samples: four bits per lane, for each model.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::engine) struct PackedLanes {
+pub(crate) struct PackedLanes {
     /// Lanes per model before these.
     pub first: u64,
     pub words: Vec<Vec<u32>>,
@@ -99,12 +99,12 @@ pub struct Counted {
     pub layout: CountLayout,
     /// Sums over the samples.
     pub counts: Vec<u64>,
-    pub(in crate::engine) packed: Vec<PackedLanes>,
+    pub(crate) packed: Vec<PackedLanes>,
 }
 
 impl Counted {
     /// Verdicts of a lane, by its place among those of the chunk, the model innermost.
-    pub(in crate::engine) fn verdicts(&self, at: usize) -> Verdicts {
+    pub(crate) fn verdicts(&self, at: usize) -> Verdicts {
         let models = self.layout.models;
         let (lane, model) = ((at / models) as u64, at % models);
         let piece = &self.packed[self.packed.partition_point(|piece| piece.first <= lane) - 1];

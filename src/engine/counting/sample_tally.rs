@@ -7,12 +7,12 @@ use serde::{Deserialize, Serialize};
 
 use super::kernel_counts::{KernelCounts, NO_KERNEL, add_counts};
 use super::layout::{CountLayout, Counted};
-use crate::engine::backend::Chunk;
-use crate::engine::generated::{ATTEMPTS, DrawnPoint, Generator};
-use crate::engine::outcome::Verdicts;
-use crate::engine::plan::LanePlan;
-use crate::model::criterion::Criterion;
-use crate::{Error, Place, Result};
+use crate::backend::Chunk;
+use crate::generated::{ATTEMPTS, DrawnPoint, Generator};
+use crate::outcome::Verdicts;
+use crate::plan::LanePlan;
+use lanesweep_model::criterion::Criterion;
+use lanesweep_support::{Error, Place, Result};
 
 /// Number of samples of one task.
 const TASK: usize = 4096;

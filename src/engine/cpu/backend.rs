@@ -6,17 +6,17 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::Result;
-use crate::engine::backend::{Backend, Chunk, RecheckBy, Session, Wanted};
-use crate::engine::cpu::foreign::BATCH_LANES;
-use crate::engine::cpu::runner::LaneRunner;
-use crate::engine::cpu::series::max_entries;
-use crate::engine::cpu::simd::Instructions;
-use crate::engine::outcome::{Outcome, Verdicts};
-use crate::engine::plan::LanePlan;
-use crate::model::driver::ModelId;
-use crate::model::scalar::Real;
-use crate::scenario::Category;
+use crate::backend::{Backend, Chunk, RecheckBy, Session, Wanted};
+use crate::cpu::foreign::BATCH_LANES;
+use crate::cpu::runner::LaneRunner;
+use crate::cpu::series::max_entries;
+use crate::cpu::simd::Instructions;
+use crate::outcome::{Outcome, Verdicts};
+use crate::plan::LanePlan;
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::scalar::Real;
+use lanesweep_model::scenario::Category;
+use lanesweep_support::Result;
 
 /// Lanes per model above which a task keeps its batches nearly full.
 const FULL_TASK: u64 = 8192;
@@ -68,7 +68,7 @@ impl CpuBackend<f32> {
     /// The lane arithmetic on the given instructions.
     ///
     /// # Errors
-    /// [`Error::Usage`](crate::Error::Usage) if this machine does not support them.
+    /// [`Error::Usage`](lanesweep_support::Error::Usage) if this machine does not support them.
     pub fn with_instructions(instructions: Instructions) -> Result<Self> {
         Ok(CpuBackend { instructions: instructions.checked()?, every_step: false, arithmetic: PhantomData })
     }

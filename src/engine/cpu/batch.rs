@@ -1,4 +1,4 @@
-//! Many lanes in parallel: the step of [`crate::engine::lane_step`] in a loop over arrays, which the compiler
+//! Many lanes in parallel: the step of [`crate::lane_step`] in a loop over arrays, which the compiler
 //! vectorizes. The source code of the models is shared with single lanes.
 //!
 //! A burst is [`ROWS`] steps of [`BATCHES`] batches in turn. Each step of a batch depends on the previous one, but
@@ -6,21 +6,21 @@
 //! burst ends. A lane in steady following continues to its end, which changes no verdict. `cpu/simd.rs`
 //! selects the instruction set; nothing here depends on it.
 
-use crate::engine::cpu::batch_arrays::{FixedArrays, Floats, LaneArrays, Slots, StateArrays, TrackArrays, Words};
-use crate::engine::cpu::fast_forward::quiescent_steps;
-use crate::engine::cpu::pending_lanes::{Lanes, Pending, ROOM};
-use crate::engine::cpu::series::Window;
-use crate::engine::cpu::shared_rules::Rules;
-use crate::engine::cpu::steady_following::steady_steps;
-use crate::engine::cpu::{LANES, ROWS};
-use crate::engine::frame::Simulation;
-use crate::engine::lane_step::{LaneConstants, LaneState, OtherState, advance};
-use crate::model::driver::DriverModel;
-use crate::model::scalar::Flag;
-use crate::model::scalar::Real;
+use crate::cpu::batch_arrays::{FixedArrays, Floats, LaneArrays, Slots, StateArrays, TrackArrays, Words};
+use crate::cpu::fast_forward::quiescent_steps;
+use crate::cpu::pending_lanes::{Lanes, Pending, ROOM};
+use crate::cpu::series::Window;
+use crate::cpu::shared_rules::Rules;
+use crate::cpu::steady_following::steady_steps;
+use crate::cpu::{LANES, ROWS};
+use crate::frame::Simulation;
+use crate::lane_step::{LaneConstants, LaneState, OtherState, advance};
+use lanesweep_model::driver::DriverModel;
+use lanesweep_model::scalar::Flag;
+use lanesweep_model::scalar::Real;
 
 /// Batches of a burst.
-pub(in crate::engine) const BATCHES: usize = 3;
+pub(crate) const BATCHES: usize = 3;
 
 /// Minimum number of steps before a lane that did not qualify is examined again. For quiescent steps the wait also
 /// grows with the number of steps already made.
@@ -31,14 +31,14 @@ const LOOK_AGAIN_DIVISOR: u32 = 4;
 const MIN_STEADY_STEPS: u32 = 6 * ROWS as u32;
 
 /// The batches in flight, and the series that their lanes read.
-pub(in crate::engine) struct Fleet<'c> {
+pub(crate) struct Fleet<'c> {
     pub batches: [Batch; BATCHES],
     entries: &'c [f32],
 }
 
 /// [`LANES`] lanes in flight.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::engine) struct Batch {
+pub(crate) struct Batch {
     lanes: LaneArrays<LANES>,
     /// The steps alternate between these two buffers (ping-pong), so that a vector is never stored in parts.
     after: StateArrays<LANES>,
@@ -233,7 +233,7 @@ impl Batch {
 /// Makes the next steps of all lanes; pending lanes take the free slots. Each instruction set has its own `take`, which
 /// gathers consecutive entries of every row for the free slots. Its own `turn` is [`Window::turn`].
 #[inline(always)]
-pub(in crate::engine) fn burst<M: DriverModel<f32>, const RULES: u32>(
+pub(crate) fn burst<M: DriverModel<f32>, const RULES: u32>(
     simulation: &Simulation<f32, M>,
     fleet: &mut Fleet<'_>,
     pending: &mut Pending,

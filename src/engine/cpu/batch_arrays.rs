@@ -1,35 +1,35 @@
-//! Lanes in parallel: the types of [`crate::engine::lane_step`] as arrays over `N` lanes.
+//! Lanes in parallel: the types of [`crate::lane_step`] as arrays over `N` lanes.
 
 // Arrays of words are cast to rows of words.
 #![allow(unsafe_code)]
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::engine::cpu::LANES;
-use crate::engine::cpu::shared_rules::Rules;
-use crate::engine::lane_step::{LaneConstants, LaneState, OtherConstants, Record};
-use crate::engine::outcome::NO_STEP;
-use crate::model::criterion::{BrakeThreatMaximum, Measures, TtcMinimum};
-use crate::model::driver::{DriverModel, DriverState};
-use crate::model::scalar::Flag;
+use crate::cpu::LANES;
+use crate::cpu::shared_rules::Rules;
+use crate::lane_step::{LaneConstants, LaneState, OtherConstants, Record};
+use crate::outcome::NO_STEP;
+use lanesweep_model::criterion::{BrakeThreatMaximum, Measures, TtcMinimum};
+use lanesweep_model::driver::{DriverModel, DriverState};
+use lanesweep_model::scalar::Flag;
 
 /// Marks a lane that never leaves its batch.
-pub(in crate::engine) const NEVER_LEAVES: u32 = Flag::LATEST_STEP;
+pub(crate) const NEVER_LEAVES: u32 = Flag::LATEST_STEP;
 
 /// Slots of a batch: one bit each.
-pub(in crate::engine) type Slots = u16;
+pub(crate) type Slots = u16;
 
 /// Parts of [`LaneArrays`].
 const PARTS: usize = 7;
 
 /// One number per lane.
-pub(in crate::engine) type Floats = [f32; LANES];
+pub(crate) type Floats = [f32; LANES];
 /// One word per lane.
-pub(in crate::engine) type Words = [u32; LANES];
+pub(crate) type Words = [u32; LANES];
 
 /// One series in the pool of `series.rs`; it is constant from its last entry on.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::engine) struct Track {
+pub(crate) struct Track {
     /// Its first entry.
     pub first: u32,
     /// Offset of the last entry from the first.
@@ -38,7 +38,7 @@ pub(in crate::engine) struct Track {
 
 /// Series of another vehicle's motion.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::engine) struct VehicleTracks {
+pub(crate) struct VehicleTracks {
     /// Speed, m/s.
     pub speed: Track,
     /// Lateral position, m.
@@ -58,7 +58,7 @@ impl VehicleTracks {
 /// All data of `N` lanes except the other vehicles' motions, which are in series.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
-pub(in crate::engine) struct LaneArrays<const N: usize> {
+pub(crate) struct LaneArrays<const N: usize> {
     pub fixed: FixedArrays<N>,
     pub state: StateArrays<N>,
 }
@@ -66,7 +66,7 @@ pub(in crate::engine) struct LaneArrays<const N: usize> {
 /// [`LaneConstants`] as arrays, and the positions of the other vehicles' series.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
-pub(in crate::engine) struct FixedArrays<const N: usize> {
+pub(crate) struct FixedArrays<const N: usize> {
     pub ego: EgoArrays<N>,
     pub others: [OtherArrays<N>; 2],
 }
@@ -74,7 +74,7 @@ pub(in crate::engine) struct FixedArrays<const N: usize> {
 /// Constants of the lanes that do not belong to another vehicle.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
-pub(in crate::engine) struct EgoArrays<const N: usize> {
+pub(crate) struct EgoArrays<const N: usize> {
     /// Index of the lane within the stream.
     pub lane: [u32; N],
     width: [f32; N],
@@ -91,7 +91,7 @@ pub(in crate::engine) struct EgoArrays<const N: usize> {
 /// Constants of another vehicle.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
-pub(in crate::engine) struct OtherArrays<const N: usize> {
+pub(crate) struct OtherArrays<const N: usize> {
     half_lengths: [f32; N],
     half_widths: [f32; N],
     present_from: [u32; N],
@@ -105,7 +105,7 @@ pub(in crate::engine) struct OtherArrays<const N: usize> {
 /// Positions of the series of one quantity.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
-pub(in crate::engine) struct TrackArrays<const N: usize> {
+pub(crate) struct TrackArrays<const N: usize> {
     /// Index of the first entry.
     pub first: [u32; N],
     /// Offset of the last entry from the first.
@@ -115,7 +115,7 @@ pub(in crate::engine) struct TrackArrays<const N: usize> {
 /// [`LaneState`] as arrays.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
-pub(in crate::engine) struct StateArrays<const N: usize> {
+pub(crate) struct StateArrays<const N: usize> {
     pub moving: MovingArrays<N>,
     pub ahead: AheadArrays<N>,
     pub values: ValueArrays<N>,
@@ -125,7 +125,7 @@ pub(in crate::engine) struct StateArrays<const N: usize> {
 /// Fields that every step changes.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
-pub(in crate::engine) struct MovingArrays<const N: usize> {
+pub(crate) struct MovingArrays<const N: usize> {
     pub index: [u32; N],
     pub v_ego: [f32; N],
     pub v_before: [f32; N],
@@ -140,14 +140,14 @@ pub(in crate::engine) struct MovingArrays<const N: usize> {
 /// Fields that a step changes if there is a second vehicle.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
-pub(in crate::engine) struct AheadArrays<const N: usize> {
+pub(crate) struct AheadArrays<const N: usize> {
     pub gap: [f32; N],
 }
 
 /// Fields that every step changes in a sweep that returns values.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
-pub(in crate::engine) struct ValueArrays<const N: usize> {
+pub(crate) struct ValueArrays<const N: usize> {
     reaction_step: [u32; N],
     ttc_gap: [f32; N],
     ttc_closing: [f32; N],
@@ -159,7 +159,7 @@ pub(in crate::engine) struct ValueArrays<const N: usize> {
 /// Fields of [`Measures`].
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
-pub(in crate::engine) struct MeasureArrays<const N: usize> {
+pub(crate) struct MeasureArrays<const N: usize> {
     thw_gap: [f32; N],
     thw_speed: [f32; N],
     drac_numerator: [f32; N],
@@ -343,7 +343,7 @@ impl<const N: usize> FixedArrays<N> {
 }
 
 /// The step from which on these vehicles keep speed and lateral position.
-pub(in crate::engine) fn steady_from(tracks: &[VehicleTracks]) -> u32 {
+pub(crate) fn steady_from(tracks: &[VehicleTracks]) -> u32 {
     tracks.iter().flat_map(VehicleTracks::all).map(|track| track.last).max().unwrap_or(0)
 }
 
@@ -491,7 +491,7 @@ fn fill<T: Copy, const N: usize>(row: &mut [T; N], from: usize, value: T) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::driver::Fsm;
+    use lanesweep_model::driver::Fsm;
 
     #[test]
     fn rows_lie_in_the_order_of_their_names() {

@@ -8,13 +8,13 @@
 //! This needs two promises of a driver model, [`DriverModel::safe_gap`] and [`DriverModel::ignores`]. Steps that change
 //! no bit of a lane need no promise: no later step changes a bit either.
 
-use crate::model::criterion::{BrakeThreatMaximum, TtcMinimum};
-use crate::model::driver::{DriverModel, DriverState};
-use crate::model::scalar::{Flag, Real};
+use lanesweep_model::criterion::{BrakeThreatMaximum, TtcMinimum};
+use lanesweep_model::driver::{DriverModel, DriverState};
+use lanesweep_model::scalar::{Flag, Real};
 
-use crate::engine::cpu::ROWS;
-use crate::engine::frame::Simulation;
-use crate::engine::lane_step::{
+use crate::cpu::ROWS;
+use crate::frame::Simulation;
+use crate::lane_step::{
     Ego, LaneConstants, LaneState, OtherConstants, OtherState, Record, advance, check, criteria_safe_gap, see,
     update_record,
 };
@@ -24,7 +24,7 @@ const MIN_STEPS: u32 = 4 * ROWS as u32;
 
 /// Quiescent steps, and the gaps after them.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::engine) struct Quiescent {
+pub(crate) struct Quiescent {
     pub steps: u32,
     pub gaps: [f32; 2],
 }
@@ -32,7 +32,7 @@ pub(in crate::engine) struct Quiescent {
 /// Number of a lane's next steps that can be skipped, if that saves time: no reaction, criterion or end occurs before.
 /// `state` is between two steps, at `state.index` at least 1. The other vehicles keep the speed and lateral position in
 /// `places` forever.
-pub(in crate::engine) fn quiescent_steps<M: DriverModel<f32>>(
+pub(crate) fn quiescent_steps<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
     lane: &LaneConstants<f32>,
     state: &LaneState<f32>,
@@ -131,7 +131,7 @@ fn is_still<M: DriverModel<f32>>(
 
 /// The vehicle is beside the ego's lane, where no contact, criterion or reaction is possible at any gap.
 #[inline(always)]
-pub(in crate::engine) fn is_out_of_the_way<M: DriverModel<f32>>(
+pub(crate) fn is_out_of_the_way<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
     lane: &LaneConstants<f32>,
     other: &OtherConstants<f32>,
@@ -217,13 +217,13 @@ fn carried(gap: f32, change: f32, max_steps: u32, lowest: f32) -> (u32, f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::drivers::Constants;
-    use crate::engine::frame::Frame;
-    use crate::engine::lane_case::NEVER;
-    use crate::engine::scene::Scene;
-    use crate::model::criterion::Criteria;
-    use crate::model::profile::Profile;
-    use crate::scenario::Category;
+    use crate::drivers::Constants;
+    use crate::frame::Frame;
+    use crate::lane_case::NEVER;
+    use crate::scene::Scene;
+    use lanesweep_model::criterion::Criteria;
+    use lanesweep_model::profile::Profile;
+    use lanesweep_model::scenario::Category;
 
     /// Reference: the same by repeated addition.
     fn added(gap: f32, change: f32, max_steps: u32, lowest: f32) -> (u32, f32) {

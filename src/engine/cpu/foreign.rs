@@ -5,23 +5,23 @@ use std::borrow::Cow;
 
 use rayon::prelude::*;
 
-use crate::engine::cpu::lane_result::conclude;
-use crate::engine::frame::{Frame, Simulation, Start};
-use crate::engine::lane::{Observer, Step};
-use crate::engine::lane_case::LaneCase;
-use crate::engine::lane_step::{LaneConstants, LaneState, Moved, OtherState, Seen, advance};
-use crate::engine::outcome::{NO_STEP, Outcome};
-use crate::engine::scene::Scene;
-use crate::model::criterion::Criteria;
-use crate::model::driver::{
+use crate::cpu::lane_result::conclude;
+use crate::frame::{Frame, Simulation, Start};
+use crate::lane::{Observer, Step};
+use crate::lane_case::LaneCase;
+use crate::lane_step::{LaneConstants, LaneState, Moved, OtherState, Seen, advance};
+use crate::outcome::{NO_STEP, Outcome};
+use crate::scene::Scene;
+use lanesweep_model::criterion::Criteria;
+use lanesweep_model::driver::{
     DriverModel, DriverState, Hazard, LaneColumns, MAX_ACCELERATION_MPS2, ModelId, VectorDriver, VehicleColumns, View,
 };
-use crate::model::scalar::{Flag, Real};
-use crate::scenario::Tables;
-use crate::{Error, Place, Result};
+use lanesweep_model::scalar::{Flag, Real};
+use lanesweep_model::scenario::Tables;
+use lanesweep_support::{Error, Place, Result};
 
 /// Lanes that run side by side: enough for whole-array arithmetic, few enough that a run is cancelled within seconds.
-pub(in crate::engine) const BATCH_LANES: u64 = 1 << 15;
+pub(crate) const BATCH_LANES: u64 = 1 << 15;
 
 /// The place of the driver's model in a step that the engine makes without it: it never reacts. The caller changes the
 /// speed afterwards.
@@ -47,7 +47,7 @@ impl<R: Real> DriverModel<R> for Unreacting {
 }
 
 /// What all lanes of a driver in one category share.
-pub(in crate::engine) struct Setting<'d, R> {
+pub(crate) struct Setting<'d, R> {
     model: ModelId,
     driver: &'d dyn VectorDriver,
     dt_s: f64,
@@ -57,7 +57,7 @@ pub(in crate::engine) struct Setting<'d, R> {
 
 impl<'d, R: Real> Setting<'d, R> {
     /// A driver with the frame and the criteria of its category, and the time step.
-    pub(in crate::engine) fn new(
+    pub(crate) fn new(
         (model, driver): (ModelId, &'d dyn VectorDriver),
         mut frame: Frame<R>,
         criteria: Criteria<R>,
@@ -117,11 +117,11 @@ impl<R: Real> BatchLane<R> {
     }
 }
 
-/// Runs one lane, as [`run_lane`](crate::engine::run_lane) does with a built-in driver.
+/// Runs one lane, as [`run_lane`](crate::run_lane) does with a built-in driver.
 ///
 /// # Errors
 /// Those of the driver; [`Error::Input`] for an acceleration that is missing, NaN or above the maximum.
-pub(in crate::engine) fn run_one<R: Real>(
+pub(crate) fn run_one<R: Real>(
     setting: &Setting<R>,
     case: &LaneCase<R>,
     tables: &Tables<R>,
@@ -147,7 +147,7 @@ pub(in crate::engine) fn run_one<R: Real>(
 ///
 /// # Errors
 /// Those of the driver; [`Error::Input`] for accelerations that are missing, NaN or above the maximum.
-pub(in crate::engine) fn run_lanes(
+pub(crate) fn run_lanes(
     setting: &Setting<f32>,
     cases: &[(LaneCase<f32>, Cow<'_, Tables<f32>>)],
     starts: &[Start<f32>],
@@ -253,11 +253,11 @@ mod tests {
     use super::*;
     use std::sync::Arc;
 
-    use crate::engine::verify::{SetOptions, random_plan};
-    use crate::engine::{Backend, Chunk, CpuBackend, Executor, LanePlan, LaneRunner, Wanted};
-    use crate::model::driver::{Accelerations, DriverProfile};
-    use crate::model::profile::Profile;
-    use crate::scenario::Category;
+    use crate::verify::{SetOptions, random_plan};
+    use crate::{Backend, Chunk, CpuBackend, Executor, LanePlan, LaneRunner, Wanted};
+    use lanesweep_model::driver::{Accelerations, DriverProfile};
+    use lanesweep_model::profile::Profile;
+    use lanesweep_model::scenario::Category;
 
     /// A built-in driver behind the interface of foreign ones.
     struct Wrapped {

@@ -1,13 +1,13 @@
 //! The result of a finished lane: an outcome, or only verdicts.
 
-use crate::model::criterion::{BtnContact, Contact, Criterion, contact};
-use crate::model::scalar::{Flag, Real};
+use lanesweep_model::criterion::{BtnContact, Contact, Criterion, contact};
+use lanesweep_model::scalar::{Flag, Real};
 
-use crate::engine::frame::Simulation;
-use crate::engine::lane_step::{
+use crate::frame::Simulation;
+use crate::lane_step::{
     Ego, LaneConstants, LaneState, OtherConstants, OtherState, Seen, aborts, is_settled, is_touched, see,
 };
-use crate::engine::outcome::{EndReason, NO_STEP, Outcome, Verdicts};
+use crate::outcome::{EndReason, NO_STEP, Outcome, Verdicts};
 
 /// The result that a sweep returns per lane: an outcome or only verdicts.
 pub(crate) trait Ending: From<Outcome<f32>> {

@@ -3,15 +3,15 @@
 //! stage: one for lanes with the second vehicle only, and one for steady following. A stage runs its own batches when
 //! many lanes are pending there, or no other lanes are left.
 
-use crate::engine::cpu::LANES;
-use crate::engine::cpu::batch::{BATCHES, Fleet};
-use crate::engine::cpu::lane_result::Ending;
-use crate::engine::cpu::pending_lanes::{Lanes, Pending};
-use crate::engine::cpu::shared_rules::Rules;
-use crate::engine::cpu::simd::{Burst, Instructions, burst_for};
-use crate::engine::frame::Simulation;
-use crate::engine::scene::Scene;
-use crate::model::driver::DriverModel;
+use crate::cpu::LANES;
+use crate::cpu::batch::{BATCHES, Fleet};
+use crate::cpu::lane_result::Ending;
+use crate::cpu::pending_lanes::{Lanes, Pending};
+use crate::cpu::shared_rules::Rules;
+use crate::cpu::simd::{Burst, Instructions, burst_for};
+use crate::frame::Simulation;
+use crate::scene::Scene;
+use lanesweep_model::driver::DriverModel;
 
 /// Lanes of a fleet.
 const FLEET: usize = BATCHES * LANES;
@@ -19,7 +19,7 @@ const FLEET: usize = BATCHES * LANES;
 /// Runs a stream of lanes of one model on an instruction set; all must run in batches. `each` receives every finished
 /// lane, in the order in which they end: its index within the stream and its result. `entries` are the series that the
 /// stream's tracks index.
-pub(in crate::engine) fn run_stream<M: DriverModel<f32>, E: Ending>(
+pub(crate) fn run_stream<M: DriverModel<f32>, E: Ending>(
     simulation: &Simulation<'_, f32, M>,
     instructions: Instructions,
     stream: &Lanes<'_>,

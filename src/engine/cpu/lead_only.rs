@@ -4,18 +4,18 @@
 //! and stay there. The lane then continues with the other vehicle only. Verdict-only batches make these steps together
 //! with single-vehicle lanes, at half the cost.
 
-use crate::model::driver::DriverModel;
-use crate::model::scalar::Flag;
+use lanesweep_model::driver::DriverModel;
+use lanesweep_model::scalar::Flag;
 
-use crate::engine::cpu::ROWS;
-use crate::engine::cpu::batch_arrays::{NEVER_LEAVES, Track, VehicleTracks};
-use crate::engine::cpu::fast_forward::is_out_of_the_way;
-use crate::engine::frame::Simulation;
-use crate::engine::lane_step::{LaneConstants, OtherState};
+use crate::cpu::ROWS;
+use crate::cpu::batch_arrays::{NEVER_LEAVES, Track, VehicleTracks};
+use crate::cpu::fast_forward::is_out_of_the_way;
+use crate::frame::Simulation;
+use crate::lane_step::{LaneConstants, OtherState};
 
 /// The first step from which only the second vehicle matters under this model, and the driver attends to it.
 /// [`NEVER_LEAVES`] if there is none, or if the second vehicle may leave or is not evaluated. `tracks` index `entries`.
-pub(in crate::engine) fn lead_only_from<M: DriverModel<f32>>(
+pub(crate) fn lead_only_from<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
     lane: &LaneConstants<f32>,
     tracks: &[VehicleTracks; 2],
@@ -58,19 +58,19 @@ pub(in crate::engine) fn lead_only_from<M: DriverModel<f32>>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::cpu::series::Series;
-    use crate::engine::drivers::Constants;
-    use crate::engine::frame::Start;
-    use crate::engine::lane_case::LaneCase;
-    use crate::engine::lane_step::{LaneState, advance};
-    use crate::engine::scene::Scene;
-    use crate::model::criterion::Criteria;
-    use crate::model::driver::ModelId;
-    use crate::model::profile::Profile;
-    use crate::scenario::parameterization::{Parameterization, ParameterizationOptions, recorded_case};
-    use crate::scenario::{Category, Tables};
-    use lanesweep_traffic::traffic::mining::{MiningOptions, mine_generated};
-    use lanesweep_traffic::traffic::trajectory::generator::GeneratorOptions;
+    use crate::cpu::series::Series;
+    use crate::drivers::Constants;
+    use crate::frame::Start;
+    use crate::lane_case::LaneCase;
+    use crate::lane_step::{LaneState, advance};
+    use crate::scene::Scene;
+    use lanesweep_model::criterion::Criteria;
+    use lanesweep_model::driver::ModelId;
+    use lanesweep_model::profile::Profile;
+    use lanesweep_model::scenario::parameterization::{Parameterization, ParameterizationOptions, recorded_case};
+    use lanesweep_model::scenario::{Category, Tables};
+    use lanesweep_traffic::mining::{MiningOptions, mine_generated};
+    use lanesweep_traffic::trajectory::generator::GeneratorOptions;
 
     /// Recorded and kinematic cut-outs of a synthetic recording.
     fn cut_outs(profile: &Profile) -> (Vec<LaneCase<f32>>, Tables<f32>) {

@@ -1,25 +1,25 @@
 //! Pending lanes in the layout of a batch. A case is written once for all its headways; free slots take its rows one by
 //! one.
 
-use crate::model::driver::DriverModel;
+use lanesweep_model::driver::DriverModel;
 
-use crate::engine::cpu::LANES;
-use crate::engine::cpu::batch_arrays::{LaneArrays, NEVER_LEAVES, Slots, VehicleTracks, Words, steady_from};
-use crate::engine::cpu::lead_only::lead_only_from;
-use crate::engine::frame::{Simulation, Start};
-use crate::engine::lane_case::LaneCase;
-use crate::engine::lane_step::{LaneConstants, LaneState};
+use crate::cpu::LANES;
+use crate::cpu::batch_arrays::{LaneArrays, NEVER_LEAVES, Slots, VehicleTracks, Words, steady_from};
+use crate::cpu::lead_only::lead_only_from;
+use crate::frame::{Simulation, Start};
+use crate::lane_case::LaneCase;
+use crate::lane_step::{LaneConstants, LaneState};
 
 /// Maximum number of pending lanes: 29 KiB with one other vehicle for verdicts, 60 KiB with all fields, padding
 /// included.
-pub(in crate::engine) const MAX_PENDING: usize = 256;
+pub(crate) const MAX_PENDING: usize = 256;
 
 /// Capacity with padding: cases are written, and lanes are read, for [`LANES`] lanes at once.
-pub(in crate::engine) const ROOM: usize = MAX_PENDING + LANES;
+pub(crate) const ROOM: usize = MAX_PENDING + LANES;
 
 /// The lanes of a stream: every case with every start, all starts of a case in sequence.
 #[derive(Clone, Copy)]
-pub(in crate::engine) struct Lanes<'c> {
+pub(crate) struct Lanes<'c> {
     /// Its cases.
     pub cases: &'c [LaneCase<f32>],
     /// Their motions, unrolled.
@@ -30,7 +30,7 @@ pub(in crate::engine) struct Lanes<'c> {
     pub one_start_each: bool,
     /// Every step is made with all vehicles; no lane moves to another stage.
     pub every_step: bool,
-    /// A step of one of its lanes [may cross](crate::engine::scene::may_cross) another vehicle.
+    /// A step of one of its lanes [may cross](crate::scene::may_cross) another vehicle.
     pub may_cross: bool,
 }
 
@@ -43,7 +43,7 @@ impl<'c> Lanes<'c> {
 }
 
 /// Lanes pending for one stage: the next lanes of a stream, and those moved here from another stage.
-pub(in crate::engine) struct Pending {
+pub(crate) struct Pending {
     lanes: Box<LaneArrays<ROOM>>,
     /// The sweep returns values, not only verdicts.
     values: bool,
@@ -187,7 +187,7 @@ impl Pending {
 
 /// Gives the slots, in their order, the entries of every row from a place on: one by one, on every machine.
 #[inline(always)]
-pub(in crate::engine) fn take(rows: &mut [Words], pending: &[[u32; ROOM]], from: usize, slots: Slots) {
+pub(crate) fn take(rows: &mut [Words], pending: &[[u32; ROOM]], from: usize, slots: Slots) {
     for (row, pending) in rows.iter_mut().zip(pending) {
         let (mut left, mut from) = (slots, from);
         while left != 0 {

@@ -4,23 +4,23 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Mutex;
 
-use crate::Result;
-use crate::engine::cpu::foreign::{Setting, run_lanes};
-use crate::engine::cpu::lane_result::Ending;
-use crate::engine::cpu::pending_lanes::Lanes;
-use crate::engine::cpu::series::Series;
-use crate::engine::cpu::simd::Instructions;
-use crate::engine::drivers::Constants;
-use crate::engine::frame::Start;
-use crate::engine::lane::Silent;
-use crate::engine::lane_case::LaneCase;
-use crate::engine::outcome::{Outcome, Verdicts};
-use crate::engine::plan::{LaneKey, LanePlan};
-use crate::engine::scene::{Scene, fastest_in, may_cross};
-use crate::model::criterion::Criteria;
-use crate::model::driver::{ModelId, VectorDriver};
-use crate::model::scalar::Real;
-use crate::scenario::Tables;
+use crate::cpu::foreign::{Setting, run_lanes};
+use crate::cpu::lane_result::Ending;
+use crate::cpu::pending_lanes::Lanes;
+use crate::cpu::series::Series;
+use crate::cpu::simd::Instructions;
+use crate::drivers::Constants;
+use crate::frame::Start;
+use crate::lane::Silent;
+use crate::lane_case::LaneCase;
+use crate::outcome::{Outcome, Verdicts};
+use crate::plan::{LaneKey, LanePlan};
+use crate::scene::{Scene, fastest_in, may_cross};
+use lanesweep_model::criterion::Criteria;
+use lanesweep_model::driver::{ModelId, VectorDriver};
+use lanesweep_model::scalar::Real;
+use lanesweep_model::scenario::Tables;
+use lanesweep_support::Result;
 
 /// Runs lanes of a plan one by one, in the arithmetic `R`.
 pub struct LaneRunner<'p, R> {
@@ -47,7 +47,7 @@ impl<'p, R: Real> LaneRunner<'p, R> {
     }
 
     /// Rounds the numbers of each lane when it runs. For a few lanes, so that the plan's series are not held twice.
-    pub(in crate::engine) fn of_few(plan: &'p LanePlan) -> Self {
+    pub(crate) fn of_few(plan: &'p LanePlan) -> Self {
         LaneRunner {
             plan,
             tables: Tables::default(),
@@ -96,7 +96,7 @@ impl<'p, R: Real> LaneRunner<'p, R> {
     }
 
     /// The plan whose lanes it runs.
-    pub(in crate::engine) fn plan(&self) -> &'p LanePlan {
+    pub(crate) fn plan(&self) -> &'p LanePlan {
         self.plan
     }
 
@@ -119,7 +119,7 @@ impl<'p, R: Real> LaneRunner<'p, R> {
     }
 
     /// Runs all lanes of one unit in the plan's order, except those of drivers outside the registry; passes position
-    /// within the unit and outcome, for verdicts without [`Measures`](crate::model::criterion::Measures).
+    /// within the unit and outcome, for verdicts without [`Measures`](lanesweep_model::criterion::Measures).
     pub(super) fn run_unit(
         &self,
         block: usize,
@@ -237,18 +237,13 @@ impl LaneRunner<'_, f32> {
     }
 
     /// Whether all lanes run in batches on these instructions. Lanes with a criterion that iterates run one by one.
-    pub(in crate::engine) fn runs_in_batches(&self, instructions: Instructions) -> bool {
+    pub(crate) fn runs_in_batches(&self, instructions: Instructions) -> bool {
         self.constants.iter().all(|constants| constants.run_in_batches(instructions))
     }
 
     /// Runs selected lanes of one block and model in a batch that makes every step; one by one if they do not run in
     /// batches. Passes the position in `keys` and the verdicts.
-    pub(in crate::engine) fn run_keys(
-        &self,
-        instructions: Instructions,
-        keys: &[LaneKey],
-        mut each: impl FnMut(usize, Verdicts),
-    ) {
+    pub(crate) fn run_keys(&self, instructions: Instructions, keys: &[LaneKey], mut each: impl FnMut(usize, Verdicts)) {
         let Some(&LaneKey { block, model, .. }) = keys.first() else { return };
         let constants = &self.constants[block];
         if !constants.run_in_batches(instructions) {

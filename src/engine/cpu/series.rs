@@ -2,20 +2,20 @@
 //! case. The last entry of every series is repeated, so that a batch reads [`ROWS`] entries at a time without testing
 //! for the end. A [`Window`] holds one quantity for all lanes of a batch over the rows of a burst.
 
-use crate::engine::cpu::batch_arrays::{Floats, Track, TrackArrays, VehicleTracks, Words};
-use crate::engine::cpu::{LANES, ROWS};
-use crate::engine::lane_case::LaneCase;
-use crate::model::scalar::Real;
-use crate::scenario::{LATERAL_SAMPLED, Motion, SPEED_SAMPLED, Tables};
+use crate::cpu::batch_arrays::{Floats, Track, TrackArrays, VehicleTracks, Words};
+use crate::cpu::{LANES, ROWS};
+use crate::lane_case::LaneCase;
+use lanesweep_model::scalar::Real;
+use lanesweep_model::scenario::{LATERAL_SAMPLED, Motion, SPEED_SAMPLED, Tables};
 
 /// The pool that series lie in.
 #[derive(Debug, Default)]
-pub(in crate::engine) struct Series {
+pub(crate) struct Series {
     entries: Vec<f32>,
 }
 
 /// Maximum number of entries of a vehicle's motion.
-pub(in crate::engine) fn max_entries(step_cap: u32) -> u64 {
+pub(crate) fn max_entries(step_cap: u32) -> u64 {
     3 * (u64::from(step_cap) + 1 + ROWS as u64)
 }
 
@@ -92,7 +92,7 @@ impl Series {
 /// Rows of one quantity of one vehicle.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
-pub(in crate::engine) struct Window {
+pub(crate) struct Window {
     /// One row per step.
     pub rows: [Floats; ROWS],
     /// The series of at least one lane continues beyond these rows.
@@ -124,7 +124,7 @@ impl Window {
 
 /// Positions in the pool at which the lanes read their series at these steps.
 #[inline(always)]
-pub(in crate::engine) fn places(tracks: &TrackArrays<LANES>, steps: &Words) -> Words {
+pub(crate) fn places(tracks: &TrackArrays<LANES>, steps: &Words) -> Words {
     let mut places = tracks.first;
     for ((place, &step), &last) in places.iter_mut().zip(steps).zip(&tracks.last) {
         *place += step.min(last);
@@ -134,7 +134,7 @@ pub(in crate::engine) fn places(tracks: &TrackArrays<LANES>, steps: &Words) -> W
 
 /// Whether the series of some lane continues beyond its step.
 #[inline(always)]
-pub(in crate::engine) fn goes_on(tracks: &TrackArrays<LANES>, steps: &Words) -> bool {
+pub(crate) fn goes_on(tracks: &TrackArrays<LANES>, steps: &Words) -> bool {
     let mut on = 0;
     for (&step, &last) in steps.iter().zip(&tracks.last) {
         on |= u32::from(step < last);
@@ -159,7 +159,7 @@ fn standing(tracks: impl Iterator<Item = Track>, entries: &[f32]) -> Option<f32>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scenario::{Lateral, Speed};
+    use lanesweep_model::scenario::{Lateral, Speed};
 
     /// The unrolled series equal the motion at every step, also beyond its end.
     #[test]

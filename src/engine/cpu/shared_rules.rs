@@ -1,13 +1,13 @@
 //! Rules that all lanes of a stream share. Each set of rules has its own compiled loop, so the loop tests none of them.
 
-use crate::model::criterion::{BtnForm, Criteria, LateralGate};
+use lanesweep_model::criterion::{BtnForm, Criteria, LateralGate};
 
-use crate::engine::frame::Frame;
-use crate::engine::scene::Scene;
+use crate::frame::Frame;
+use crate::scene::Scene;
 
 /// A set of rules.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::engine) struct Rules {
+pub(crate) struct Rules {
     /// Common properties of the other vehicles.
     pub scene: Scene,
     is_ratio: bool,
@@ -22,7 +22,7 @@ pub(in crate::engine) struct Rules {
 
 impl Rules {
     /// Number of sets.
-    pub(in crate::engine) const SETS: u32 = 22;
+    pub(crate) const SETS: u32 = 22;
 
     const VERDICT_ONLY: u32 = 4;
     const SELDOM: u32 = 8;
@@ -33,12 +33,7 @@ impl Rules {
 
     /// Rules of a simulation; `None` for the exact form of the BTN, which iterates and runs lane by lane.
     /// `values`: the sweep returns values, not only verdicts.
-    pub(in crate::engine) fn of(
-        frame: &Frame<f32>,
-        criteria: &Criteria<f32>,
-        scene: Scene,
-        values: bool,
-    ) -> Option<Rules> {
+    pub(crate) fn of(frame: &Frame<f32>, criteria: &Criteria<f32>, scene: Scene, values: bool) -> Option<Rules> {
         let is_ratio = match criteria.btn.form() {
             BtnForm::EquivalentDelay => false,
             BtnForm::DistanceRatio => true,
@@ -54,12 +49,12 @@ impl Rules {
     }
 
     /// Rules of steady-following steps with a single vehicle, for verdicts only.
-    pub(in crate::engine) fn is_steady() -> Rules {
+    pub(crate) fn is_steady() -> Rules {
         Rules::from_bits(Rules::STEADY_FOLLOWING)
     }
 
     /// Encoded as a number below [`Rules::SETS`].
-    pub(in crate::engine) const fn bits(self) -> u32 {
+    pub(crate) const fn bits(self) -> u32 {
         if self.scene.is_steady {
             return Rules::STEADY_FOLLOWING;
         }
@@ -79,7 +74,7 @@ impl Rules {
     }
 
     /// Inverse of [`Rules::bits`].
-    pub(in crate::engine) const fn from_bits(bits: u32) -> Rules {
+    pub(crate) const fn from_bits(bits: u32) -> Rules {
         let is_pair = bits & 1 != 0;
         let scene = Scene { is_pair, always_there: !is_pair, in_lane: false, is_steady: false, may_cross: false };
         let common = Rules {
@@ -113,11 +108,7 @@ impl Rules {
 
     /// The constants of the simulation; those that the rules fix become compile-time constants.
     #[inline(always)]
-    pub(in crate::engine) fn applied(
-        self,
-        frame: &Frame<f32>,
-        criteria: &Criteria<f32>,
-    ) -> (Frame<f32>, Criteria<f32>) {
+    pub(crate) fn applied(self, frame: &Frame<f32>, criteria: &Criteria<f32>) -> (Frame<f32>, Criteria<f32>) {
         let form = if self.is_ratio { BtnForm::DistanceRatio } else { BtnForm::EquivalentDelay };
         let (gate, abort_above_ttc) = match (self.is_seldom, self.sees_overlap) {
             (true, _) => (criteria.gate, frame.abort_above_ttc),

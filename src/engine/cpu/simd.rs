@@ -14,25 +14,25 @@ use super::{
     pending_lanes::ROOM,
     series::{goes_on, places},
 };
-use crate::engine::cpu::batch::{Fleet, burst};
-use crate::engine::cpu::pending_lanes::{Pending, take};
-use crate::engine::cpu::series::Window;
-use crate::engine::cpu::shared_rules::Rules;
-use crate::engine::frame::Simulation;
-use crate::model::driver::DriverModel;
-use crate::{Error, Place, Result};
+use crate::cpu::batch::{Fleet, burst};
+use crate::cpu::pending_lanes::{Pending, take};
+use crate::cpu::series::Window;
+use crate::cpu::shared_rules::Rules;
+use crate::frame::Simulation;
+use lanesweep_model::driver::DriverModel;
+use lanesweep_support::{Error, Place, Result};
 
 /// [`burst`] compiled for an instruction set and a set of rules.
 ///
 /// Only [`burst_for`] makes one, and only for instructions that the machine has.
-pub(in crate::engine) struct Burst<M> {
+pub(crate) struct Burst<M> {
     run: unsafe fn(&Simulation<f32, M>, &mut Fleet<'_>, &mut Pending),
 }
 
 impl<M> Burst<M> {
     /// Runs it.
     #[inline]
-    pub(in crate::engine) fn run(&self, simulation: &Simulation<f32, M>, fleet: &mut Fleet<'_>, pending: &mut Pending) {
+    pub(crate) fn run(&self, simulation: &Simulation<f32, M>, fleet: &mut Fleet<'_>, pending: &mut Pending) {
         // SAFETY: the functions are unsafe only because of the instructions that they use; `burst_for` has detected
         // that the machine supports these.
         unsafe { (self.run)(simulation, fleet, pending) }
@@ -71,7 +71,7 @@ macro_rules! for_rules {
 }
 
 /// The burst for these rules on an instruction set; `None` where lanes run one by one.
-pub(in crate::engine) fn burst_for<M: DriverModel<f32>>(instructions: Instructions, rules: Rules) -> Option<Burst<M>> {
+pub(crate) fn burst_for<M: DriverModel<f32>>(instructions: Instructions, rules: Rules) -> Option<Burst<M>> {
     if !instructions.is_available() {
         return None;
     }

@@ -6,19 +6,19 @@
 //! Verdict-only batches make these steps together with similar lanes, with that part only. [`steady_steps`] returns for
 //! how long this equals the whole step, to the bit.
 
-use crate::model::driver::DriverModel;
-use crate::model::scalar::Real;
+use lanesweep_model::driver::DriverModel;
+use lanesweep_model::scalar::Real;
 
-use crate::engine::cpu::ROWS;
-use crate::engine::frame::Simulation;
-use crate::engine::lane_step::{LaneConstants, LaneState, OtherState, criteria_safe_gap};
+use crate::cpu::ROWS;
+use crate::frame::Simulation;
+use crate::lane_step::{LaneConstants, LaneState, OtherState, criteria_safe_gap};
 
 /// Maximum number of steps predicted at once; it bounds the rounding error of their gaps.
 const MAX_STEPS: u32 = 1024;
 
 /// Number of a lane's next steps that certainly follow steadily, at most `MAX_STEPS`. `state` is between two steps, at
 /// `state.index` at least 1. The only other vehicle keeps the speed and lateral position in `place` forever.
-pub(in crate::engine) fn steady_steps<M: DriverModel<f32>>(
+pub(crate) fn steady_steps<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
     lane: &LaneConstants<f32>,
     state: &LaneState<f32>,
@@ -49,16 +49,16 @@ pub(in crate::engine) fn steady_steps<M: DriverModel<f32>>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::drivers::Constants;
-    use crate::engine::lane_step::{OtherConstants, Record, advance};
-    use crate::engine::outcome::NO_STEP;
-    use crate::engine::scene::Scene;
-    use crate::model::criterion::{BrakeThreatMaximum, Criteria, TtcMinimum};
-    use crate::model::driver::{DriverProfile, DriverState};
-    use crate::model::profile::Profile;
-    use crate::model::scalar::Flag;
-    use crate::random::philox4x32_10;
-    use crate::scenario::Category;
+    use crate::drivers::Constants;
+    use crate::lane_step::{OtherConstants, Record, advance};
+    use crate::outcome::NO_STEP;
+    use crate::scene::Scene;
+    use lanesweep_model::criterion::{BrakeThreatMaximum, Criteria, TtcMinimum};
+    use lanesweep_model::driver::{DriverProfile, DriverState};
+    use lanesweep_model::profile::Profile;
+    use lanesweep_model::scalar::Flag;
+    use lanesweep_model::scenario::Category;
+    use lanesweep_random::philox4x32_10;
 
     /// A lane behind a vehicle that keeps its speed, at some step of its run: the ego brakes or has braked.
     fn lane(number: u32) -> (LaneConstants<f32>, LaneState<f32>, OtherState<f32>) {
@@ -105,7 +105,7 @@ mod tests {
         for name in Profile::names() {
             let constants = Constants::<f32>::resolve(&Profile::load(name).unwrap(), Category::Lvd);
             let criteria = &Criteria { keeps_values: false, ..constants.criteria };
-            let frame = &crate::engine::frame::Frame { step_cap: 3000, abort_above_ttc: 0.0, ..constants.frames[3] };
+            let frame = &crate::frame::Frame { step_cap: 3000, abort_above_ttc: 0.0, ..constants.frames[3] };
             let whole =
                 Simulation { frame, criteria, model: &constants.fsm, model_index: 3, scene: Scene::unknown(false) };
             let short = Simulation { scene: Scene { is_steady: true, ..Scene::in_lane() }, ..whole };

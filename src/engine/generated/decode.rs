@@ -1,10 +1,10 @@
 //! Point → validity and case. Twin: `shaders/shared/decode.wgsl`, with the same names and order.
 
-use crate::engine::lane_case::{LaneCase, LaneOther};
-use crate::model::driver::{LaneGeometry, NEVER};
-use crate::model::scalar::Real;
-use crate::scenario::parameterization::Variable;
-use crate::scenario::{LATERAL_SAMPLED, Motion, SPEED_SAMPLED, Tables};
+use crate::lane_case::{LaneCase, LaneOther};
+use lanesweep_model::driver::{LaneGeometry, NEVER};
+use lanesweep_model::scalar::Real;
+use lanesweep_model::scenario::parameterization::Variable;
+use lanesweep_model::scenario::{LATERAL_SAMPLED, Motion, SPEED_SAMPLED, Tables};
 
 use super::recipe::{CasePath, LateralPath, NO_SLOT, Recipe};
 
@@ -99,7 +99,7 @@ pub(super) fn case<R: Real>(recipe: &Recipe, basis: &[f32], point: &[f32], table
         gap_offset,
         present_from: 0,
         present_until: NEVER,
-        attend_from: [0; crate::model::driver::MODELS],
+        attend_from: [0; lanesweep_model::driver::MODELS],
         used: 1,
         judged,
     };

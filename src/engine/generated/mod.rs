@@ -12,9 +12,9 @@ pub use decode::SINE;
 pub use points::{ATTEMPTS, DrawnPoint, MAX_PARAMETERS, PointSource, Points};
 pub use recipe::{CasePath, ColumnBound, LateralPath, MAX_BOUNDS, NO_SLOT, Recipe, ReducedColumns};
 
-use crate::model::scalar::Real;
-use crate::scenario::Tables;
-use crate::scenario::parameterization::Variable;
+use lanesweep_model::scalar::Real;
+use lanesweep_model::scenario::Tables;
+use lanesweep_model::scenario::parameterization::Variable;
 
 use super::lane_case::LaneCase;
 use super::plan::CaseSource;

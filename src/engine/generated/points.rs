@@ -1,6 +1,6 @@
 //! Sample index → point: equal Gaussian kernels drawn with counter-based random words, or a table of given points. Twin: `shaders/shared/points.wgsl`.
 
-use crate::random::{Stream, choose, standard_normal};
+use lanesweep_random::{Stream, choose, standard_normal};
 
 /// Maximum number of parameters of a point.
 pub const MAX_PARAMETERS: usize = 14;
@@ -55,7 +55,7 @@ impl Points {
         (self.means.len() / self.dimensions) as u32
     }
 
-    /// Number of points; `None` if every index has one. A [plan](crate::engine::LanePlan) holds no sample beyond.
+    /// Number of points; `None` if every index has one. A [plan](crate::LanePlan) holds no sample beyond.
     pub(crate) fn count(&self) -> Option<u64> {
         match &self.source {
             PointSource::Random(_) => None,

@@ -7,11 +7,11 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::engine::lane_case::{LaneCase, LaneOther};
-use crate::model::driver::{AttentionRule, MODELS};
-use crate::model::scalar::Real;
-use crate::scenario::parameterization::{LaneChange, Parameterization, SpeedProfile, Variable};
-use crate::scenario::{Category, Motion};
+use crate::lane_case::{LaneCase, LaneOther};
+use lanesweep_model::driver::{AttentionRule, MODELS};
+use lanesweep_model::scalar::Real;
+use lanesweep_model::scenario::parameterization::{LaneChange, Parameterization, SpeedProfile, Variable};
+use lanesweep_model::scenario::{Category, Motion};
 
 use super::points::MAX_PARAMETERS;
 
@@ -161,7 +161,7 @@ pub struct Recipe {
     pub ego_width: f32,
     /// Width of its lane, m.
     pub lane_width: f32,
-    /// Attention rule of each driver model, in the order of [`ModelId::ALL`](crate::model::driver::ModelId::ALL).
+    /// Attention rule of each driver model, in the order of [`ModelId::ALL`](lanesweep_model::driver::ModelId::ALL).
     pub attention: [AttentionRule<f32>; MODELS],
 }
 

@@ -4,8 +4,8 @@ use std::fmt;
 
 use serde::Serialize;
 
-use crate::engine::device_choice::pci_bus_id;
-use crate::{Error, Result};
+use crate::device_choice::pci_bus_id;
+use lanesweep_support::{Error, Result};
 
 /// Kind of device, as its driver reports it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]

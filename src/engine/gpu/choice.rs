@@ -3,8 +3,8 @@
 //! A software rasterizer runs on the same cores as the CPU backend, but slower, so it must be named.
 
 use super::adapters::{AdapterCard, DeviceKind};
-use crate::engine::device_choice::{BackendChoice, DeviceName};
-use crate::{Error, Place, Result};
+use crate::device_choice::{BackendChoice, DeviceName};
+use lanesweep_support::{Error, Place, Result};
 
 /// The index of the device to use, or `None` for the CPU.
 ///
@@ -96,7 +96,7 @@ fn no_gpu(cards: &[AdapterCard]) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::gpu::{AdapterLimits, Api};
+    use crate::gpu::{AdapterLimits, Api};
 
     fn card(index: usize, name: &str, kind: DeviceKind, api: Api, bus: Option<&str>) -> AdapterCard {
         AdapterCard {

@@ -13,8 +13,8 @@ use super::adapters::{AdapterCard, DeviceKind};
 use super::pacing::{Sharing, Tuner};
 use super::shader::{self, BURST, COUNT, ENTRY, GENERATE, WORKGROUP};
 use super::spirv::exact_spirv;
-use crate::model::driver::ModelId;
-use crate::{Error, Result};
+use lanesweep_model::driver::ModelId;
+use lanesweep_support::{Error, Result};
 
 /// Options of a device.
 #[derive(Debug, Clone)]

@@ -3,10 +3,10 @@
 use super::device::Device;
 use super::records::{DrawnRecord, Generation};
 use super::shader::WORKGROUP;
-use crate::Result;
-use crate::engine::LaneCase;
-use crate::engine::generated::{Generator, PointSource, Recipe};
-use crate::random::normal_table;
+use crate::LaneCase;
+use crate::generated::{Generator, PointSource, Recipe};
+use lanesweep_random::normal_table;
+use lanesweep_support::Result;
 
 /// The tables of a session.
 pub(super) struct Inputs {

@@ -12,8 +12,8 @@ use super::generator::Inputs;
 use super::generator::{GeneratorSetup, generate};
 use super::records::StartRecord;
 use super::ring::{Answer, Flight, Job, RING, Slot};
-use crate::engine::LaneCase;
-use crate::{Error, Result};
+use crate::LaneCase;
+use lanesweep_support::{Error, Result};
 
 /// Requirements of a session on the device.
 pub(super) struct Setup {

@@ -7,11 +7,11 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::engine::{EndReason, LaneCase, LaneOther, NO_STEP, Outcome, Start, Verdicts};
-use crate::model::criterion::{BrakeThreatMaximum, Contact, Criteria};
-use crate::model::driver::MODELS;
-use crate::model::scalar::Flag;
-use crate::scenario::Motion;
+use crate::{EndReason, LaneCase, LaneOther, NO_STEP, Outcome, Start, Verdicts};
+use lanesweep_model::criterion::{BrakeThreatMaximum, Contact, Criteria};
+use lanesweep_model::driver::MODELS;
+use lanesweep_model::scalar::Flag;
+use lanesweep_model::scenario::Motion;
 
 const _: () = assert!(size_of::<Motion<f32>>() == 64);
 const _: () = assert!(size_of::<LaneOther<f32>>() == 64 + 4 * (7 + MODELS));
@@ -130,7 +130,7 @@ impl OutcomeRecord {
         let btn = BrakeThreatMaximum::from_quotient(
             self.btn_numerator,
             self.btn_denominator,
-            Flag::of(verdicts.failed(crate::model::criterion::Criterion::Btn)),
+            Flag::of(verdicts.failed(lanesweep_model::criterion::Criterion::Btn)),
         );
         Some(Outcome {
             verdicts,
@@ -184,7 +184,7 @@ pub struct Generation {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
 pub struct DrawnRecord {
-    /// Draws; more than [`ATTEMPTS`](crate::engine::generated::ATTEMPTS) if all were invalid.
+    /// Draws; more than [`ATTEMPTS`](crate::generated::ATTEMPTS) if all were invalid.
     pub tries: u32,
     /// Component of the mixture.
     pub component: u32,

@@ -10,7 +10,7 @@ use super::generator::Inputs;
 use super::pacing::Sharing;
 use super::records::{Launch, OutcomeRecord, Tally};
 use super::shader::{LONGEST_BURST, WORKGROUP};
-use crate::{Error, Result};
+use lanesweep_support::{Error, Result};
 
 /// Maximum number of jobs in flight.
 pub(super) const RING: usize = 3;

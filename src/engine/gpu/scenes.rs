@@ -1,9 +1,9 @@
 //! Properties of the cases of a dispatch, found on the host: constants of its pipeline.
 
-use crate::engine::scene::{is_centred, is_there, may_cross};
-use crate::engine::{DeviceScene, LaneCase, LaneOther, MotionKind};
-use crate::model::scalar::Real;
-use crate::scenario::{LATERAL_SAMPLED, Motion, SPEED_SAMPLED};
+use crate::scene::{is_centred, is_there, may_cross};
+use crate::{DeviceScene, LaneCase, LaneOther, MotionKind};
+use lanesweep_model::scalar::Real;
+use lanesweep_model::scenario::{LATERAL_SAMPLED, Motion, SPEED_SAMPLED};
 
 impl DeviceScene {
     /// The scene of one case; `fastest` is the highest speed of the tables, m/s.

@@ -17,15 +17,15 @@ use super::records::StartRecord;
 use super::ring::{Answer, Dispatch, Job, RING, TallyJob};
 use super::shader::{self, Specialization};
 use super::tally::{MAX_COUNTED, counter};
-use crate::engine::counting::PackedLanes;
-use crate::engine::generated::Generator;
-use crate::engine::{
+use crate::counting::PackedLanes;
+use crate::generated::Generator;
+use crate::{
     Backend, Chunk, Constants, CountLayout, Counted, DeviceRecord, DeviceScene, LaneCase, LanePlan, Outcome, Session,
     Verdicts, Wanted,
 };
-use crate::model::driver::ModelId;
-use crate::scenario::Tables;
-use crate::{Error, Result};
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::scenario::Tables;
+use lanesweep_support::{Error, Result};
 
 /// Jobs per chunk, so that the ring stays full: about three seconds with four models. Before the first measurement a
 /// chunk is one job.
@@ -406,7 +406,7 @@ impl GpuBackend {
     /// Opens the device with this index.
     ///
     /// # Errors
-    /// [`crate::Error::Device`] if its driver refuses.
+    /// [`lanesweep_support::Error::Device`] if its driver refuses.
     pub fn open(adapters: &Adapters, index: usize, options: GpuOptions) -> Result<GpuBackend> {
         GpuBackend::open_tampered(adapters, index, options, Tampering::default())
     }

@@ -1,7 +1,7 @@
 //! Joins the files in `shaders/` to the source of one model's pipeline, with constants from the profile.
 
-use crate::engine::{Constants, DeviceScene};
-use crate::model::driver::{MODELS, ModelId};
+use crate::{Constants, DeviceScene};
+use lanesweep_model::driver::{MODELS, ModelId};
 
 /// Entry point of every pipeline.
 pub const ENTRY: &str = "lanes";
@@ -26,7 +26,7 @@ pub const SHARED: [(&str, &str); 13] = [
 ];
 
 /// Fragments of sampling, twins of `src/stats/random`, for a kernel that declares their table: `normal_table:
-/// array<vec4<f32>>` ([`normal_table`](crate::random::normal_table)).
+/// array<vec4<f32>>` ([`normal_table`](lanesweep_random::normal_table)).
 pub const RANDOM: [(&str, &str); 2] = [
     ("shared/philox.wgsl", include_str!("../../../shaders/shared/philox.wgsl")),
     ("shared/normal.wgsl", include_str!("../../../shaders/shared/normal.wgsl")),
@@ -77,7 +77,7 @@ macro_rules! declare_shaders {
         }
     };
 }
-crate::for_every_driver_model!(declare_shaders);
+lanesweep_model::for_every_driver_model!(declare_shaders);
 
 /// Default of models whose shader does not define this function, as in its trait.
 const NO_LATCH: &str = "fn keeps_braking(state: DriverState, view: View) -> bool { return false; }\n";

@@ -5,7 +5,7 @@ use naga::back::spv;
 use naga::proc::{BoundsCheckPolicies, BoundsCheckPolicy};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
-use crate::{Error, Result};
+use lanesweep_support::{Error, Result};
 
 /// SPIR-V opcodes that this file uses.
 mod op {
@@ -128,11 +128,11 @@ fn forbid_contraction(words: &[u32]) -> Result<Vec<u32>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::gpu::shader;
-    use crate::engine::{Constants, DeviceScene};
-    use crate::model::driver::ModelId;
-    use crate::model::profile::Profile;
-    use crate::scenario::Category;
+    use crate::gpu::shader;
+    use crate::{Constants, DeviceScene};
+    use lanesweep_model::driver::ModelId;
+    use lanesweep_model::profile::Profile;
+    use lanesweep_model::scenario::Category;
 
     fn count(words: &[u32], wanted: impl Fn(u32, &[u32]) -> bool) -> usize {
         let (mut at, mut found) = (op::HEADER, 0);

@@ -1,7 +1,7 @@
 //! What the counting kernel is told of a plan.
 
 use super::ring::TallyJob;
-use crate::engine::{CountLayout, LanePlan};
+use crate::{CountLayout, LanePlan};
 
 /// Maximum number of samples of a counted job, so that no count of it overflows.
 pub(super) const MAX_COUNTED: u64 = 1 << 25;

@@ -1,6 +1,6 @@
 //! The decisions of the threshold set, and the starts of its cases.
 
-use crate::engine::Headway;
+use crate::Headway;
 
 /// The starts: for one of them, a case's `gap_offset` puts the vehicle on its threshold.
 pub(super) const HEADWAYS: [Headway; 4] =

@@ -4,12 +4,12 @@
 use super::decision::{HEADWAYS, Threshold};
 use super::series::{LateralStart, TINY, ThresholdSeries, rounded};
 use super::{CaseRandom, Purpose};
-use crate::engine::{CaseSource, Constants, LaneCase, LaneOther, NO_STEP};
-use crate::model::criterion::{BrakeThreatMaximum, BtnForm};
-use crate::model::driver::{DriverModel, MODELS, View};
-use crate::model::profile::Profile;
-use crate::model::scalar::Flag;
-use crate::scenario::{Category, Lateral, Motion, Tables};
+use crate::{CaseSource, Constants, LaneCase, LaneOther, NO_STEP};
+use lanesweep_model::criterion::{BrakeThreatMaximum, BtnForm};
+use lanesweep_model::driver::{DriverModel, MODELS, View};
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scalar::Flag;
+use lanesweep_model::scenario::{Category, Lateral, Motion, Tables};
 
 /// Neighbours of gap 0 for starts of 10 m, where 2⁻³² is too small: one ULP of 10 m.
 const SMALL: f32 = 1.0 / (1 << 20) as f32;

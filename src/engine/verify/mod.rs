@@ -4,7 +4,7 @@
 //! plausible numbers ([`random_plan`]), and a set on the decision thresholds ([`threshold_plan`]), where one unit in
 //! the last place decides. Cases are pure functions of (seed, category, unit, variant), so the key of a lane suffices
 //! to repeat it: each (purpose, seed, category, unit, variant) has its own stream of random numbers. Plans go to
-//! [`crate::engine`].
+//! [`crate`].
 
 mod decision;
 mod first_step;
@@ -23,12 +23,12 @@ use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
 
-use crate::engine::{Backend, Chunk, CpuBackend, LanePlan, Outcome, Session, Wanted, chunks, words};
-use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
-use crate::scenario::Category;
-use crate::support::ranges::refuse_repeats;
-use crate::{Error, Place, Result};
+use crate::{Backend, Chunk, CpuBackend, LanePlan, Outcome, Session, Wanted, chunks, words};
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::scenario::Category;
+use lanesweep_support::ranges::refuse_repeats;
+use lanesweep_support::{Error, Place, Result};
 
 /// Options of a set.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -278,7 +278,7 @@ pub struct SelfCheck {
 /// # Errors
 /// Those of the backend.
 pub fn self_check(tested: &dyn Backend) -> Result<SelfCheck> {
-    let profile = crate::model::profile::Profile::load("paper")?;
+    let profile = lanesweep_model::profile::Profile::load("paper")?;
     let random = SetOptions { size: 400, ..Default::default() };
     let thresholds = SetOptions { size: 2, ..Default::default() };
     let plans = [random_plan(&profile, &random)?, threshold_plan(&profile, &thresholds)?];

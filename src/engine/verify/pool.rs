@@ -2,7 +2,7 @@
 //! steps. A case refers to them, so a set of any size has the same tables.
 
 use super::{CaseRandom, Purpose};
-use crate::scenario::{Category, Lateral, Speed, Tables};
+use lanesweep_model::scenario::{Category, Lateral, Speed, Tables};
 
 /// Entries of the longest series.
 pub(super) const LONGEST: usize = 400;

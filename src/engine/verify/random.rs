@@ -5,11 +5,13 @@ use std::sync::Arc;
 
 use super::pool::{LateralRole, Pool, Slice};
 use super::{CaseRandom, Purpose, SetOptions};
-use crate::Result;
-use crate::engine::{Block, CaseSource, Headway, LaneCase, LaneOther, LanePlan, NO_STEP};
-use crate::model::driver::MODELS;
-use crate::model::profile::{CutOutTarget, Profile};
-use crate::scenario::{Ahead, Case, Category, LATERAL_SAMPLED, Lateral, Participant, SPEED_SAMPLED, Speed, Tables};
+use crate::{Block, CaseSource, Headway, LaneCase, LaneOther, LanePlan, NO_STEP};
+use lanesweep_model::driver::MODELS;
+use lanesweep_model::profile::{CutOutTarget, Profile};
+use lanesweep_model::scenario::{
+    Ahead, Case, Category, LATERAL_SAMPLED, Lateral, Participant, SPEED_SAMPLED, Speed, Tables,
+};
+use lanesweep_support::Result;
 
 /// Variants of every unit: all motions sampled (`S`), all kinematic, one of each, and corner cases.
 pub const VARIANTS: [&str; 4] = ["S", "kinematic", "mixed", "degenerate"];
@@ -24,7 +26,7 @@ fn headways() -> Vec<Headway> {
 /// Plans the random set of a seed. Keys are `random-cut-in-seed157-0000123`; the number is that of the unit.
 ///
 /// # Errors
-/// [`Error::Usage`](crate::Error::Usage) without a size, categories or models, or if a category is named twice.
+/// [`Error::Usage`](lanesweep_support::Error::Usage) without a size, categories or models, or if a category is named twice.
 pub fn random_plan(profile: &Profile, options: &SetOptions) -> Result<LanePlan> {
     options.check()?;
     let headways = headways();

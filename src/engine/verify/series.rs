@@ -1,7 +1,7 @@
 //! The motions of the threshold set: their first step is exactly a given f32, from a table or by arithmetic.
 
 use super::{CaseRandom, Purpose};
-use crate::scenario::{Category, LATERAL_SAMPLED, Lateral, Motion, SPEED_SAMPLED, Speed, Tables};
+use lanesweep_model::scenario::{Category, LATERAL_SAMPLED, Lateral, Motion, SPEED_SAMPLED, Speed, Tables};
 
 /// Neighbour of 0: far below the change of one step, and large enough that neither its third power (a form of the
 /// BTN) nor a quotient of its squares is subnormal, which devices may flush.

@@ -7,10 +7,10 @@ use std::sync::Arc;
 use super::SetOptions;
 use super::decision::{HEADWAYS, Threshold};
 use super::first_step::ThresholdCases;
-use crate::Result;
-use crate::engine::{Block, LanePlan};
-use crate::model::profile::Profile;
-use crate::scenario::Category;
+use crate::{Block, LanePlan};
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scenario::Category;
+use lanesweep_support::Result;
 
 /// Variants of every unit: on the threshold (`S`), and the deciding quantity one ULP smaller and larger. Around 0 the
 /// neighbours are ±2⁻³², which no device flushes; steps and times change by one step.
@@ -20,7 +20,7 @@ pub const SIDES: [&str; 3] = ["S", "below", "above"];
 /// the unit in its category, for any size.
 ///
 /// # Errors
-/// [`Error::Usage`](crate::Error::Usage) without a size, categories or models, or if a category is named twice.
+/// [`Error::Usage`](lanesweep_support::Error::Usage) without a size, categories or models, or if a category is named twice.
 pub fn threshold_plan(profile: &Profile, options: &SetOptions) -> Result<LanePlan> {
     options.check()?;
     let units = options.size * Threshold::ALL.len() as u64;

@@ -1,6 +1,6 @@
 //! Collision: the boxes overlap along and across the road. Side contacts count.
 
-use crate::model::scalar::{Flag, Real};
+use crate::scalar::{Flag, Real};
 
 /// How two vehicles touch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,7 +3,7 @@
 //! (PET). Definitions and sources: docs/src/methods/criteria.md.
 
 use super::ttc::TtcMinimum;
-use crate::model::scalar::{Flag, Real};
+use crate::scalar::{Flag, Real};
 
 /// Measures over the steps so far. Extreme quotients are kept as numerator and denominator, so that a step divides only
 /// for the TIT.

@@ -21,7 +21,7 @@ pub use ttc::{TimeToCollision, TtcMinimum};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::model::scalar::{Flag, Real};
+use crate::scalar::{Flag, Real};
 
 /// The registry of criteria, in the order of every table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]

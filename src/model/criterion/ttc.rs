@@ -1,6 +1,6 @@
 //! Time to collision: gap over closing speed, 0 at contact.
 
-use crate::model::scalar::{Flag, Real};
+use crate::scalar::{Flag, Real};
 
 /// The threshold.
 #[derive(Debug, Clone, Copy, PartialEq)]

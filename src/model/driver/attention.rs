@@ -4,8 +4,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::model::category::Category;
-use crate::model::scalar::Real;
+use crate::category::Category;
+use crate::scalar::Real;
 
 use super::delay_steps;
 

@@ -4,7 +4,7 @@
 use std::sync::{Arc, RwLock};
 
 use super::ModelId;
-use crate::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result};
 
 /// Largest magnitude of an acceleration, m/s²: a larger one is an error of the driver.
 pub const MAX_ACCELERATION_MPS2: f32 = 100.0;
@@ -88,7 +88,7 @@ impl ModelId {
     /// [`Error::Usage`] for the name of a built-in model, a name that is not a word of letters, digits, `_`, `-` and
     /// `.`, and for more than 2³² drivers.
     pub fn register(name: &str, fingerprint: &str, driver: Arc<dyn VectorDriver>) -> Result<ModelId> {
-        let place = || Place::item(format!("driver `{}`", crate::support::plain_text::cut(name)));
+        let place = || Place::item(format!("driver `{}`", lanesweep_support::plain_text::cut(name)));
         let is_word = |text: &str| text.bytes().all(|b| b.is_ascii_alphanumeric() || b"_-.".contains(&b));
         if name.is_empty() || name.len() > 40 || !is_word(name) || !is_word(fingerprint) {
             let help = "use a word of at most 40 letters, digits, `_`, `-` and `.`";

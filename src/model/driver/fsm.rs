@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use super::{
     Bound, DriverModel, DriverProfile, DriverState, Hazard, View, delay_bound_s, delay_steps, latched_braking,
 };
-use crate::model::category::Category;
-use crate::model::scalar::{Flag, Real};
+use crate::category::Category;
+use crate::scalar::{Flag, Real};
 
 /// Which acceleration the CFS step divides by if the ego would be slower than the other vehicle after τ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -237,7 +237,7 @@ mod tests {
     /// CFS alone sets the demand where it is above 0; otherwise PFS does; where both are 0 the situation is safe.
     #[test]
     fn the_critical_surrogate_decides_before_the_proactive_one() {
-        let profile = crate::model::profile::Profile::load("paper").unwrap().fsm;
+        let profile = crate::profile::Profile::load("paper").unwrap().fsm;
         let fsm: Fsm<f64> = profile.resolve(0.1, Category::CutIn);
         let comfort = profile.comfortable_deceleration_mps2;
         let span = profile.max_surrogate_deceleration_mps2 - comfort;

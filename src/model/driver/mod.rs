@@ -21,7 +21,7 @@ pub use foreign::{Accelerations, ForeignId, LaneColumns, MAX_ACCELERATION_MPS2, 
 pub use profile::{Bound, DriverProfile};
 pub(crate) use profile::{SHORT_STEP_S, delay_bound_s};
 
-use crate::model::scalar::{Flag, Real};
+use crate::scalar::{Flag, Real};
 
 /// Declares the modules, their public names and [`ModelId`] from the registry.
 macro_rules! declare_models {
@@ -253,9 +253,9 @@ fn delay_steps(delay_s: f64, dt_s: f64) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::category::Category;
-    use crate::model::profile::Profile;
-    use lanesweep_random::random::philox4x32_10;
+    use crate::category::Category;
+    use crate::profile::Profile;
+    use lanesweep_random::philox4x32_10;
 
     #[test]
     fn delays_are_whole_steps_rounded_up_without_the_error_of_the_quotient() {

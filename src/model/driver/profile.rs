@@ -1,8 +1,8 @@
 //! The interface of every driver model's constants in a profile, and their ranges.
 
 use super::{AttentionRule, DriverModel};
-use crate::model::category::Category;
-use crate::model::scalar::Real;
+use crate::category::Category;
+use crate::scalar::Real;
 
 /// Physical range of a constant, in its unit. A value in the range is finite and not subnormal in binary32, and so are
 /// the values that models derive from it.
@@ -21,10 +21,10 @@ pub struct Bound {
 }
 
 impl Bound {
-    /// A deceleration, m/s².
-    pub(crate) const DECELERATION: Bound = Bound::new("m/s²", 0.001, 100.0);
+    /// A deceleration that a driver can demand, m/s²; less is one in g, or of cruising.
+    pub(crate) const DECELERATION: Bound = Bound::new("m/s²", 1.0, 100.0);
     /// An acceleration or deceleration, or 0, m/s².
-    pub(super) const ACCELERATION: Bound = Bound::DECELERATION.or_zero();
+    pub(super) const ACCELERATION: Bound = Bound::new("m/s²", 0.001, 100.0).or_zero();
     /// A jerk, m/s³.
     pub(crate) const JERK: Bound = Bound::new("m/s³", 0.001, 1e6);
     /// A time, s.

@@ -8,7 +8,7 @@ use serde::de::{self, DeserializeSeed, Deserializer, Error as _, MapAccess, Visi
 use super::case_parameters::{CaseParameters, NamedNumber};
 use super::case_quantity::NUMBERS;
 use super::units::Written;
-use crate::Error;
+use lanesweep_support::Error;
 
 /// The values of a file.
 #[derive(Debug, Default)]

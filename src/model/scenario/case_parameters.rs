@@ -3,10 +3,10 @@
 use super::case_quantity::{CaseNumber, NUMBERS};
 use super::units::{self, Written};
 use super::{Category, LANE_WIDTH_M, PlainCase, check_headway, missing_parameter};
-use crate::model::profile::FrameProfile;
-use crate::support::plausibility::{Doubts, HELP, Quantity};
-use crate::support::table::{NameUnit, Resolved, resolve};
-use crate::{Error, Place, Result};
+use crate::profile::FrameProfile;
+use lanesweep_support::plausibility::{Doubts, HELP, Quantity};
+use lanesweep_support::table::{NameUnit, Resolved, resolve};
+use lanesweep_support::{Error, Place, Result};
 
 /// Shortest and longest duration, s: the longest is the time cap of the paper's profile.
 pub(super) const DURATIONS_S: (f64, f64) = (0.1, 120.0);

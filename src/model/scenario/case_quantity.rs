@@ -3,9 +3,9 @@
 
 use super::CaseParameters;
 use super::units::{self, Written};
-use crate::model::category::Category;
-use crate::support::plausibility::Quantity;
-use crate::support::table::{NameUnit, Named};
+use crate::category::Category;
+use lanesweep_support::plausibility::Quantity;
+use lanesweep_support::table::{NameUnit, Named};
 
 /// A quantity of a case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -6,8 +6,8 @@ use serde_json::{Map, Value};
 use super::Category;
 use super::schema::{Content, FIELDS, Field, Presence};
 use super::units::{Unusable, Written, si};
-use crate::support::error::{Error, Result};
-use crate::support::table::{Column, ColumnKind, NameUnit, Named, Resolved, TableReader, nearest, resolve};
+use lanesweep_support::error::{Error, Result};
+use lanesweep_support::table::{Column, ColumnKind, NameUnit, Named, Resolved, TableReader, nearest, resolve};
 
 /// A field that is not a record.
 pub(super) struct Leaf {

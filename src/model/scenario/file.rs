@@ -17,11 +17,11 @@ use super::columns::{Leaf, leaves};
 use super::found::{ScenarioFile, ScenariosRead};
 use super::schema::wrong_field;
 use super::{Scenario, table_reader};
-use crate::support::atomic_file::AtomicFile;
-use crate::support::input_file;
-use crate::support::plausibility::Implausible;
-use crate::support::table::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter};
-use crate::{Error, Place, Result};
+use lanesweep_support::atomic_file::AtomicFile;
+use lanesweep_support::input_file;
+use lanesweep_support::plausibility::Implausible;
+use lanesweep_support::table::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter};
+use lanesweep_support::{Error, Place, Result};
 
 /// Formats for writing; the first is the default for names without an ending.
 const WRITTEN: [TableFormat; 2] = [TableFormat::JsonLines, TableFormat::Parquet];

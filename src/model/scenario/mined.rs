@@ -9,8 +9,8 @@ use std::fmt::Display;
 use serde::{Deserialize, Serialize};
 
 use super::parameterization::ReducedScenario;
-use crate::model::category::Category;
-use crate::{Error, Place, Result};
+use crate::category::Category;
+use lanesweep_support::{Error, Place, Result};
 
 /// Side of the ego's lane, in the direction of travel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]

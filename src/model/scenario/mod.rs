@@ -19,10 +19,10 @@ mod schema;
 mod table_reader;
 mod units;
 
-pub use crate::model::case::{Ahead, Case, LANE_WIDTH_M, Participant, PlainCase};
-pub use crate::model::case::{check_headway, missing_parameter};
-pub use crate::model::category::Category;
-pub use crate::model::motion::{LATERAL_SAMPLED, Lateral, LateralState, Motion, SPEED_SAMPLED, Speed, Tables};
+pub use crate::case::{Ahead, Case, LANE_WIDTH_M, Participant, PlainCase};
+pub use crate::case::{check_headway, missing_parameter};
+pub use crate::category::Category;
+pub use crate::motion::{LATERAL_SAMPLED, Lateral, LateralState, Motion, SPEED_SAMPLED, Speed, Tables};
 pub use case_file::CaseFile;
 pub use case_parameters::{CaseParameters, NamedNumber};
 pub use case_quantity::{CaseNumber, CaseQuantity, GAP_ERROR_M, KMH, MeasurementError, NUMBERS, SPEED_ERROR_MPS};

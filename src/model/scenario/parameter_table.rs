@@ -10,9 +10,9 @@ use super::columns::{Chosen, HELP, choose};
 use super::found::{ScenarioFile, ScenariosRead};
 use super::units::{Written, si};
 use super::{Category, Ego, Lateral, Other, PlainCase, Scenario, Side, Speed};
-use crate::support::error::{Error, Place, Result};
-use crate::support::plausibility::{Doubts, Implausible};
-use crate::support::table::{Named, Row, TableReader};
+use lanesweep_support::error::{Error, Place, Result};
+use lanesweep_support::plausibility::{Doubts, Implausible};
+use lanesweep_support::table::{Named, Row, TableReader};
 
 /// Columns that are texts; those of the numbers of a case follow, then [`RATE`].
 const TEXTS: [&str; 3] = ["id", "category", "models"];
@@ -79,7 +79,7 @@ impl ParameterRows {
     /// and the next rows follow.
     ///
     /// # Errors
-    /// As [`TableRows::next_row`](crate::support::table::TableRows::next_row).
+    /// As [`TableRows::next_row`](lanesweep_support::table::TableRows::next_row).
     pub fn next_row(&mut self) -> Result<Option<NumberedRow>> {
         match self.table.rows.next_row() {
             Ok(Some(row)) => Ok(Some((row.number, self.typed(row)))),

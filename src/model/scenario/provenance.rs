@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::support::files::{remove_file, write_atomically};
-use crate::support::input_file;
-use crate::{Error, Place, Result};
+use lanesweep_support::files::{remove_file, write_atomically};
+use lanesweep_support::input_file;
+use lanesweep_support::{Error, Place, Result};
 
 /// Driven time and distance of the recordings that were searched for scenarios.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

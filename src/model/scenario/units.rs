@@ -1,8 +1,8 @@
 //! Numbers as users write them: with a unit in the value, in the name (`ego_speed_kmh`), or without one. One rule for
 //! flags, files of a case, tables and Python.
 
-use crate::support::readable::value;
-use crate::support::table::NameUnit;
+use lanesweep_support::readable::value;
+use lanesweep_support::table::NameUnit;
 
 /// A unit in lower case, and its number per SI unit.
 type Unit = (&'static str, f64);

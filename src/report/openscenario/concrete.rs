@@ -2,10 +2,10 @@
 //!
 //! A path gives a vehicle's position step by step: from the trace, and after its end from the vehicle's own motion.
 
-use crate::engine::{LaneCase, Trace};
-use crate::model::scalar::Real;
-use crate::scenario::{Category, Side, Tables};
-use crate::{Error, Place, Result};
+use lanesweep_engine::{LaneCase, Trace};
+use lanesweep_model::scalar::Real;
+use lanesweep_model::scenario::{Category, Side, Tables};
+use lanesweep_support::{Error, Place, Result};
 
 /// Who drives the ego.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -5,16 +5,16 @@
 //! therefore every gap and contact, stay the same.
 
 use super::concrete::{Concrete, EgoMotion, PlayedVehicle, paths};
-use crate::engine::{EndReason, LaneCase, LaneKey, LaneOther, LanePlan, LaneRunner, NO_STEP, Trace};
-use crate::model::criterion::Criterion;
-use crate::model::driver::NEVER;
-use crate::model::profile::{CutOutTarget, Profile};
-use crate::model::scalar::Real;
-use crate::report::records::smallest_gap_m;
-use crate::run::reopen::{Reopened, TracedCase};
-use crate::scenario::parameterization::{Sizes, VehicleSize};
-use crate::scenario::{Category, LATERAL_SAMPLED, Motion, SPEED_SAMPLED, Scenario, Side, Tables};
-use crate::{Error, Place, Result};
+use crate::records::smallest_gap_m;
+use lanesweep_engine::{EndReason, LaneCase, LaneKey, LaneOther, LanePlan, LaneRunner, NO_STEP, Trace};
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::NEVER;
+use lanesweep_model::profile::{CutOutTarget, Profile};
+use lanesweep_model::scalar::Real;
+use lanesweep_model::scenario::parameterization::{Sizes, VehicleSize};
+use lanesweep_model::scenario::{Category, LATERAL_SAMPLED, Motion, SPEED_SAMPLED, Scenario, Side, Tables};
+use lanesweep_run::reopen::{Reopened, TracedCase};
+use lanesweep_support::{Error, Place, Result};
 
 /// Options of the export.
 #[derive(Debug, Clone, Copy)]
@@ -292,7 +292,7 @@ const TOLERANCE_M: f64 = 1e-3;
 /// [`Error::Input`] if the given sizes do not match the lane.
 fn sizes_of_case(lane: &str, case: &LaneCase<f64>, known: Option<&Sizes>, ego_length_m: f64) -> Result<Sizes> {
     let is_pair = case.pair != 0;
-    let sums = |of: fn(&crate::engine::LaneOther<f64>) -> f64| case.others.each_ref().map(|o| 2.0 * of(o));
+    let sums = |of: fn(&lanesweep_engine::LaneOther<f64>) -> f64| case.others.each_ref().map(|o| 2.0 * of(o));
     let (lengths, widths) = (sums(|o| o.half_lengths), sums(|o| o.half_widths));
     let Some(known) = known else {
         let shortest = if is_pair { lengths[0].min(lengths[1]) } else { lengths[0] };

@@ -1,7 +1,7 @@
 //! OpenSCENARIO: export of concrete scenarios.
 //!
 //! This module holds exported scenarios ([`Concrete`]), their two files (ASAM OpenSCENARIO XML 1.2 and ASAM OpenDRIVE
-//! 1.7), and the conversion of lanes, which come from [`crate::run::reopen`].
+//! 1.7), and the conversion of lanes, which come from [`lanesweep_run::reopen`].
 
 mod concrete;
 mod lanes;

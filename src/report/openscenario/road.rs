@@ -3,7 +3,7 @@
 
 use super::DATE;
 use super::concrete::{Concrete, number};
-use crate::report::records::PROGRAM;
+use crate::records::PROGRAM;
 
 /// A straight road along x. The middle of the ego's lane is y = 0.
 #[derive(Debug, Clone, Copy, PartialEq)]

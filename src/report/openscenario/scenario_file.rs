@@ -11,10 +11,10 @@ use std::path::Path;
 use super::DATE;
 use super::concrete::{Concrete, EgoMotion, PlayedVehicle, Vertex, number};
 use super::road::{Road, road_file};
-use crate::Result;
-use crate::report::records::PROGRAM;
-use crate::support::run_folder::RunFolder;
-use crate::support::table::Table;
+use crate::records::PROGRAM;
+use lanesweep_support::Result;
+use lanesweep_support::run_folder::RunFolder;
+use lanesweep_support::table::Table;
 
 /// Name of the parameter for the initial speed of an external ego.
 const EGO_SPEED: &str = "ego_speed_mps";
@@ -267,7 +267,7 @@ pub struct IndexRow {
 /// Writes every scenario with its road, and the index, to a folder; replaces an earlier export.
 ///
 /// # Errors
-/// As `scenario_file`; [`crate::Error::Io`].
+/// As `scenario_file`; [`lanesweep_support::Error::Io`].
 pub fn export_folder(dir: &Path, scenarios: &[Concrete]) -> Result<Vec<IndexRow>> {
     // Everything is built before the first file is written, so that an error leaves the folder unchanged.
     let row = |(at, scenario): (usize, &Concrete)| {

@@ -1,7 +1,7 @@
 //! Axes of the figures: linear, logarithmic or by the square root, with ticks at round numbers.
 
 use super::svg::Position;
-use crate::support::readable::{OneTwoFive, next, one_two_five, plain_step};
+use lanesweep_support::readable::{OneTwoFive, next, one_two_five, plain_step};
 
 /// Scale of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -17,7 +17,7 @@ pub enum AxisScale {
 
 impl AxisScale {
     /// Whether the axis can show `value`. Beyond 1e±300 widths and ratios would overflow `f64`.
-    pub(in crate::report) fn shows(self, value: f64) -> bool {
+    pub(crate) fn shows(self, value: f64) -> bool {
         match self {
             Self::Linear => value.abs() <= 1e300,
             Self::Logarithmic => (1e-300..=1e300).contains(&value),
@@ -37,7 +37,7 @@ impl AxisScale {
 
 /// An axis between two round ends.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::report) struct Axis {
+pub(crate) struct Axis {
     scale: AxisScale,
     /// Ends, as returned by [`AxisScale::place`].
     low: f64,
@@ -50,7 +50,7 @@ pub(in crate::report) struct Axis {
 
 /// A tick of the axis, with its number if there is room for it.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::report) struct Tick {
+pub(crate) struct Tick {
     pub at_px: f64,
     pub label: Option<String>,
 }
@@ -205,7 +205,7 @@ impl Axis {
 /// The axis starts at most one decade below the smallest estimate or, where that is zero, below the upper end. Without
 /// this limit a lower end close to zero would compress everything else. An upper end that represents a zero estimate
 /// has room for an arrow below it.
-pub(in crate::report) fn logarithmic_reach(intervals: &[(f64, f64, f64)]) -> Vec<f64> {
+pub(crate) fn logarithmic_reach(intervals: &[(f64, f64, f64)]) -> Vec<f64> {
     let shown = |v: &f64| AxisScale::Logarithmic.shows(*v);
     let middles: Vec<f64> = intervals.iter().map(|(e, _, u)| if *e > 0.0 { *e } else { *u / 3.0 }).collect();
     let Some(smallest) = middles.iter().copied().filter(shown).reduce(f64::min) else { return Vec::new() };
@@ -214,14 +214,14 @@ pub(in crate::report) fn logarithmic_reach(intervals: &[(f64, f64, f64)]) -> Vec
 }
 
 /// The name of a parameter in words, without its unit: `lateral speed` for `lateral_speed_mps`.
-pub(in crate::report) fn quantity(name: &str) -> String {
+pub(crate) fn quantity(name: &str) -> String {
     let units = ["_mps2", "_mps", "_m", "_s"];
     let bare = units.iter().find_map(|unit| name.strip_suffix(unit)).unwrap_or(name);
     bare.replace('_', " ")
 }
 
 /// A number with three digits in short form: `0.012`, `250`, `1.5e-6`; NaN and infinity in words.
-pub(in crate::report) fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     digits_text(value, 3)
 }
 
@@ -265,7 +265,7 @@ fn value((digit, exponent): OneTwoFive) -> f64 {
 }
 
 /// A round number slightly above `value` (positive), at which an axis from zero can end.
-pub(in crate::report) fn plain_end(value: f64) -> f64 {
+pub(crate) fn plain_end(value: f64) -> f64 {
     let step = plain_step(value / 8.0);
     (value / step - 1e-9).ceil() * step
 }

@@ -5,7 +5,7 @@ use super::axis::{Axes, number};
 use super::look::Look;
 use super::svg::{Anchor, Canvas, GREY, GRID, Paint, Position, Type, WHITE, set};
 
-pub(in crate::report) const TICK: Type = set(13, false, GREY);
+pub(crate) const TICK: Type = set(13, false, GREY);
 
 /// A line with more values than this has no markers, because they would hide it.
 const MAX_MARKERS: usize = 40;
@@ -19,7 +19,7 @@ const MIN_SCENARIOS: f64 = 10.0;
 pub(super) const HOLLOW: &str = "Hollow: fewer than ten failing scenarios; n is their number.";
 
 /// Whether a value is based on few failing scenarios; their number may be an effective one.
-pub(in crate::report) fn is_few(failing_scenarios: f64) -> bool {
+pub(crate) fn is_few(failing_scenarios: f64) -> bool {
     failing_scenarios < MIN_SCENARIOS
 }
 
@@ -151,7 +151,7 @@ impl Series {
     }
 
     /// The same with a look of its own.
-    pub(in crate::report) fn with_look(self, look: Look) -> Self {
+    pub(crate) fn with_look(self, look: Look) -> Self {
         Series { look: Some(look), ..self }
     }
 

@@ -64,12 +64,12 @@ impl Look {
         }
     }
 
-    pub(in crate::report) fn paint(&self) -> Paint<'static> {
+    pub(crate) fn paint(&self) -> Paint<'static> {
         Paint { dash: self.dash, ..Paint::line(self.colour, self.line_px) }
     }
 
     /// Draws the marker at a point, with a white rim that separates it from markers below.
-    pub(in crate::report) fn marker(&self, canvas: &mut Canvas, (x, y): Position) {
+    pub(crate) fn marker(&self, canvas: &mut Canvas, (x, y): Position) {
         let (r, colour) = (self.marker_px, self.colour);
         let rimmed = match self.is_hollow {
             true => Paint { fill: Some(WHITE), ..Paint::line(colour, 1.6) },

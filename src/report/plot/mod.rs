@@ -23,9 +23,9 @@ pub(super) use layer::{TICK, is_few};
 pub(super) use svg::tests::words;
 pub(super) use svg::{Anchor, Canvas, GREY, INK, Type, set};
 
-use crate::support::table::Table;
 use axis::{Axes, on_circle};
 use frame::{numbers_left, spoke_name};
+use lanesweep_support::table::Table;
 use svg::{GRID, Paint, Position, WHITE};
 
 /// Width of a figure: type of 13 px becomes 6 pt at the 252 pt of a paper's column.

@@ -5,20 +5,20 @@
 
 use std::fmt::{Display, Write};
 
-use crate::support::plain_text::acts;
+use lanesweep_support::plain_text::acts;
 
-pub(in crate::report) const INK: &str = "#1a1a1a";
-pub(in crate::report) const GREY: &str = "#5f5f5f";
-pub(in crate::report) const GRID: &str = "#bdbdbd";
-pub(in crate::report) const WHITE: &str = "#ffffff";
+pub(crate) const INK: &str = "#1a1a1a";
+pub(crate) const GREY: &str = "#5f5f5f";
+pub(crate) const GRID: &str = "#bdbdbd";
+pub(crate) const WHITE: &str = "#ffffff";
 const FONTS: &str = "DejaVu Sans, Verdana, Arial, Helvetica, sans-serif";
 
 /// A position on the page, px.
-pub(in crate::report) type Position = (f64, f64);
+pub(crate) type Position = (f64, f64);
 
 /// Paint of a shape. Colours are `#rrggbb`.
 #[derive(Debug, Clone, Copy, Default)]
-pub(in crate::report) struct Paint<'a> {
+pub(crate) struct Paint<'a> {
     pub fill: Option<&'a str>,
     /// Opacity of the fill, 0 to 1; `None` is 1.
     pub opacity: Option<f64>,
@@ -40,13 +40,13 @@ impl<'a> Paint<'a> {
 
 /// Type of a text: size, weight, colour.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::report) struct Type {
+pub(crate) struct Type {
     pub size_px: u32,
     pub bold: bool,
     pub colour: &'static str,
 }
 
-pub(in crate::report) const fn set(size_px: u32, bold: bool, colour: &'static str) -> Type {
+pub(crate) const fn set(size_px: u32, bold: bool, colour: &'static str) -> Type {
     Type { size_px, bold, colour }
 }
 
@@ -104,7 +104,7 @@ impl Type {
 
 /// Alignment of a text at its position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::report) enum Anchor {
+pub(crate) enum Anchor {
     Start,
     Middle,
     End,
@@ -112,7 +112,7 @@ pub(in crate::report) enum Anchor {
 
 /// A document under construction.
 #[derive(Debug)]
-pub(in crate::report) struct Canvas {
+pub(crate) struct Canvas {
     width_px: f64,
     body: String,
     depth: usize,

@@ -1,13 +1,13 @@
 //! Lanes step by step, as `simulate` shows them: figure, table, document and summaries.
 
 use super::{TraceFigure, TracePanels, TraceSeries, table};
-use crate::Result;
-use crate::engine::{EndReason, NO_STEP, Outcome, Trace};
-use crate::model::criterion::Criterion;
-use crate::report::lanes::outcome_json;
-use crate::report::records::{self, PROGRAM};
-use crate::run::reopen::{TracedLane, TracedLanes};
-use crate::support::readable::value;
+use crate::lanes::outcome_json;
+use crate::records::{self, PROGRAM};
+use lanesweep_engine::{EndReason, NO_STEP, Outcome, Trace};
+use lanesweep_model::criterion::Criterion;
+use lanesweep_run::reopen::{TracedLane, TracedLanes};
+use lanesweep_support::Result;
+use lanesweep_support::readable::value;
 
 /// Lanes step by step, as figure, table, document and text.
 pub struct TraceReport<'a>(pub &'a TracedLanes);

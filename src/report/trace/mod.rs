@@ -9,9 +9,9 @@ mod positions;
 
 use super::plot::number;
 use super::plot::{Anchor, Canvas, Ends, Figure, INK, Look, Plot, TICK, Type, set};
-use crate::engine::{StepMark, Trace, TracedStep};
-use crate::support::table::Table;
 pub use lanes::TraceReport;
+use lanesweep_engine::{StepMark, Trace, TracedStep};
+use lanesweep_support::table::Table;
 use panels::{Shown, mark_look};
 pub use panels::{TracePanels, TraceSeries};
 

@@ -3,7 +3,7 @@
 use super::super::plot::plain_end;
 use super::super::plot::{GREY, Height, INK, Look, Mark, Plot, PlotAxis, Rule, Series, Symbol, Value};
 use super::thousandths;
-use crate::engine::{StepMark, Trace, TracedStep, TracedVehicle};
+use lanesweep_engine::{StepMark, Trace, TracedStep, TracedVehicle};
 
 /// One lane on the sheet.
 #[derive(Debug, Clone)]

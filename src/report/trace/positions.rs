@@ -4,8 +4,8 @@
 //! a lane knows; their gap is exact.
 
 use super::{TraceFigure, thousandths};
-use crate::engine::{StepMark, Trace, TracedStep};
-use crate::report::plot::{Cells, Figure, FilledCell, GREY, Height, Plot, PlotAxis, Rule, number};
+use crate::plot::{Cells, Figure, FilledCell, GREY, Height, Plot, PlotAxis, Rule, number};
+use lanesweep_engine::{StepMark, Trace, TracedStep};
 
 /// Names and colours of the vehicles.
 const VEHICLES: [(&str, &str); 3] =

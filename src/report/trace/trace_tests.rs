@@ -2,13 +2,13 @@
 
 use super::super::plot::words;
 use super::{TraceFigure, TracePanels, TraceSeries, table};
-use crate::engine::{Headway, LaneCase, LanePlan, LaneRunner, StepMark, Trace};
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
-use crate::run::study::{StudyOptions, plan_study};
-use crate::scenario::{Ahead, Case, Category, Lateral, Participant, Speed, Tables};
-use crate::traffic::mining::{MiningOptions, mine_generated};
-use crate::traffic::trajectory::generator::GeneratorOptions;
+use lanesweep_engine::{Headway, LaneCase, LanePlan, LaneRunner, StepMark, Trace};
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scenario::{Ahead, Case, Category, Lateral, Participant, Speed, Tables};
+use lanesweep_run::study::{StudyOptions, plan_study};
+use lanesweep_traffic::mining::{MiningOptions, mine_generated};
+use lanesweep_traffic::trajectory::generator::GeneratorOptions;
 
 fn vehicle(speed_mps: f64, lateral: Lateral) -> Participant {
     Participant { length_m: 4.5, width_m: 1.9, speed: Speed::constant(speed_mps), lateral }
@@ -147,7 +147,7 @@ fn every_series_of_a_studys_lanes_is_inside_its_frame_and_every_mark_at_its_step
     let (mut drawn, mut contacts) = (0, 0);
     for lane in (0..plan.lane_count()).step_by(307) {
         let key = plan.key(lane).unwrap();
-        let models = (0..plan.models.len()).map(|model| runner.trace(&crate::engine::LaneKey { model, ..key }));
+        let models = (0..plan.models.len()).map(|model| runner.trace(&lanesweep_engine::LaneKey { model, ..key }));
         let traces: Vec<Trace> = models.collect();
         contacts += traces.iter().filter(|t| t.step_of(StepMark::Contact).is_some()).count();
         check(&traces);
@@ -304,7 +304,7 @@ fn the_table_has_every_number_of_the_figure() {
             let marks: Vec<_> = StepMark::ALL.into_iter().filter(|m| trace.step_of(*m) == Some(step.step)).collect();
             assert_eq!(of(row, "mark"), marks.iter().map(|m| m.label()).collect::<Vec<_>>().join("+"));
         }
-        let judged = |value: &dyn Fn(&crate::engine::TracedVehicle) -> f64| {
+        let judged = |value: &dyn Fn(&lanesweep_engine::TracedVehicle) -> f64| {
             let all = trace.steps.iter().flat_map(|s| &s.others).filter(|o| o.is_judged);
             all.map(value).fold(f64::INFINITY, f64::min)
         };

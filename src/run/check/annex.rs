@@ -5,12 +5,12 @@
 use std::borrow::Cow;
 
 use super::subject::{Lane, Subject};
-use crate::Result;
-use crate::model::driver::{BelowTrigger, CutInBraking, ModelId, NEVER};
-use crate::model::profile::{CutOutTarget, Profile};
-use crate::run::grid::Point;
-use crate::scenario::{CaseQuantity, Category, SPEED_ERROR_MPS};
-use crate::support::readable::value;
+use crate::grid::Point;
+use lanesweep_model::driver::{BelowTrigger, CutInBraking, ModelId, NEVER};
+use lanesweep_model::profile::{CutOutTarget, Profile};
+use lanesweep_model::scenario::{CaseQuantity, Category, SPEED_ERROR_MPS};
+use lanesweep_support::Result;
+use lanesweep_support::readable::value;
 
 /// Returns the condition under which CCHDM detects a danger, in a few words.
 pub(super) fn danger(profile: &Profile, category: Category) -> String {

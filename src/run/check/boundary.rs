@@ -5,10 +5,10 @@
 
 use super::subject::Subject;
 use super::{CaseVerdicts, StepBudget, Verdict};
-use crate::Result;
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
-use crate::run::grid::{CaseQuantity, MapParameter, PARAMETERS};
+use crate::grid::{CaseQuantity, MapParameter, PARAMETERS};
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::profile::Profile;
+use lanesweep_support::Result;
 
 /// Number of evenly spaced values on each side, and of values whose distances grow from the resolution on.
 const SCANNED: u32 = 100;

@@ -3,10 +3,10 @@
 
 use serde::Serialize;
 
-use crate::engine::{Trace, TracedStep, TracedVehicle};
-use crate::model::driver::{BelowTrigger, ModelId, lane_centre};
-use crate::model::profile::Profile;
-use crate::scenario::{Category, SPEED_ERROR_MPS};
+use lanesweep_engine::{Trace, TracedStep, TracedVehicle};
+use lanesweep_model::driver::{BelowTrigger, ModelId, lane_centre};
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scenario::{Category, SPEED_ERROR_MPS};
 
 /// Required relation of a value to its threshold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

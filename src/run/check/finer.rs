@@ -2,11 +2,11 @@
 
 use super::subject::Subject;
 use super::{Judgement, StepBudget};
-use crate::Result;
-use crate::engine::Outcome;
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
-use crate::run::grid::Perturbation;
+use crate::grid::Perturbation;
+use lanesweep_engine::Outcome;
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::profile::Profile;
+use lanesweep_support::Result;
 
 /// The runs of the unperturbed case with a tenth of the time step.
 #[derive(Debug, Clone)]

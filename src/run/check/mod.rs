@@ -1,7 +1,7 @@
 //! Checks one concrete case against the regulation: every profile and model, the margins, the clauses, and the distance
 //! to another answer.
 //!
-//! All computations here are in f64. The case comes from [`crate::scenario`]; the report makes the sheet.
+//! All computations here are in f64. The case comes from [`lanesweep_model::scenario`]; the report makes the sheet.
 
 mod annex;
 mod boundary;
@@ -25,14 +25,14 @@ pub use subject::{Lane, Subject};
 use verdict::settled;
 pub use verdict::{Answer, CaseVerdicts, DriverRule, RunEnd, Verdict};
 
-use crate::engine::{NO_STEP, Outcome, StepMark, Trace, check_time_step};
-use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
-use crate::run::grid::{Perturbation, Point, without_reaction};
-use crate::scenario::{Category, GAP_ERROR_M};
-use crate::support::ranges::refuse_repeats;
-use crate::{Error, Place, Result};
+use crate::grid::{Perturbation, Point, without_reaction};
+use lanesweep_engine::{NO_STEP, Outcome, StepMark, Trace, check_time_step};
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scenario::{Category, GAP_ERROR_M};
+use lanesweep_support::ranges::refuse_repeats;
+use lanesweep_support::{Error, Place, Result};
 
 /// Input of a check.
 #[derive(Debug, Clone)]

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use super::annex;
 use super::subject::Subject;
 use super::verdict::{CaseVerdicts, RunEnd};
-use crate::engine::{Executor, Headway, LanePlan, Verdicts, Wanted};
-use crate::model::criterion::Criterion;
-use crate::model::driver::{MODELS, ModelId};
-use crate::model::profile::Profile;
-use crate::run::cases::{CaseRows, by_row};
-use crate::run::grid::without_reaction;
-use crate::{Error, Result};
+use crate::cases::{CaseRows, by_row};
+use crate::grid::without_reaction;
+use lanesweep_engine::{Executor, Headway, LanePlan, Verdicts, Wanted};
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::{MODELS, ModelId};
+use lanesweep_model::profile::Profile;
+use lanesweep_support::{Error, Result};
 
 /// Returns how the lanes of every case end, in the arithmetic of the executor's backend, or why it cannot run; smallest
 /// gaps are NaN. A lane of an ego that never reacts and reaches the time cap is open, as in a map.
@@ -64,8 +64,8 @@ pub fn nominal_verdicts(
 mod tests {
     use super::super::{Answer, Check};
     use super::*;
-    use crate::engine::CpuBackend;
-    use crate::scenario::{Category, PlainCase};
+    use lanesweep_engine::CpuBackend;
+    use lanesweep_model::scenario::{Category, PlainCase};
 
     /// Cases far from every boundary: the lanes of a batch answer as the check of one case does.
     #[test]

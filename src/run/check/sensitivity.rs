@@ -4,9 +4,9 @@
 use super::annex;
 use super::verdict::{DriverRule, settled};
 use super::{Changed, Check, StepBudget, Verdict, flips};
-use crate::Result;
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::profile::Profile;
+use lanesweep_support::Result;
 
 /// The verdicts of a reading, one per rule.
 #[derive(Debug, Clone, PartialEq)]

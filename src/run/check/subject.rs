@@ -1,12 +1,12 @@
 //! The checked case and its neighbours: the same case with one number changed.
 
-use crate::engine::{Constants, Headway, LaneCase, Outcome, Step, Trace};
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
-use crate::run::grid::{CaseQuantity, Point, without_reaction};
-use crate::scenario::parameterization::{TimeGrid, recorded_case};
-use crate::scenario::{Case, Category, Lateral, PlainCase, Scenario, Speed, Tables};
-use crate::{Error, Place, Result};
+use crate::grid::{CaseQuantity, Point, without_reaction};
+use lanesweep_engine::{Constants, Headway, LaneCase, Outcome, Step, Trace};
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scenario::parameterization::{TimeGrid, recorded_case};
+use lanesweep_model::scenario::{Case, Category, Lateral, PlainCase, Scenario, Speed, Tables};
+use lanesweep_support::{Error, Place, Result};
 
 /// A concrete case.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,9 +1,9 @@
 //! The answer of a check, derived from the ends of the runs of the drivers and of an ego that never reacts.
 
 use super::subject::LaneRun;
-use crate::engine::EndReason;
-use crate::model::criterion::Criterion;
-use crate::model::driver::{MODELS, ModelId};
+use lanesweep_engine::EndReason;
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::{MODELS, ModelId};
 
 /// The answer to one case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! One parameter and its values on a grid.
 
-use crate::scenario::Category;
-use crate::{Error, Place, Result};
+use lanesweep_model::scenario::Category;
+use lanesweep_support::{Error, Place, Result};
 
 use super::parameter::MapParameter;
 

@@ -3,10 +3,10 @@
 use super::axis::GridAxis;
 use super::parameter::MapParameter;
 use super::{CaseStyle, Grid, GridParts, jrc_case};
-use crate::model::profile::Profile;
-use crate::scenario::{CaseQuantity, Category, LANE_WIDTH_M};
-use crate::support::plausibility::Doubts;
-use crate::{Error, Place, Result};
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scenario::{CaseQuantity, Category, LANE_WIDTH_M};
+use lanesweep_support::plausibility::Doubts;
+use lanesweep_support::{Error, Place, Result};
 
 /// A grid as text: an axis is `NAME=FROM..TO/STEP` or `NAME=A,B,C`.
 #[derive(Debug, Clone, Default)]

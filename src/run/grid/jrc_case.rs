@@ -3,9 +3,9 @@
 //! simulator's time step is 0.1 s; here cases are given in seconds, and their steps follow from the time step.
 //! Conformance tests replay the JRC's tables with these cases; maps sweep its grids.
 
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
-use crate::scenario::{Ahead, Case, Category, LANE_WIDTH_M, Lateral, Participant, Speed};
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scenario::{Ahead, Case, Category, LANE_WIDTH_M, Lateral, Participant, Speed};
 
 /// Length of a vehicle, m.
 pub(super) const LENGTH_M: f64 = 4.3;

@@ -1,10 +1,10 @@
 //! A swept grid: the verdicts of every cell and model, outcomes per cell and counts.
 
-use crate::engine::{Executor, LanePlan, LaneRunner, SweepSummary, Verdicts, Wanted};
-use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
-use crate::run::check::Answer;
-use crate::{Error, Place, Result};
+use crate::check::Answer;
+use lanesweep_engine::{Executor, LanePlan, LaneRunner, SweepSummary, Verdicts, Wanted};
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::ModelId;
+use lanesweep_support::{Error, Place, Result};
 
 use super::Grid;
 use super::plan::{GridPart, GridPlan};

@@ -2,7 +2,7 @@
 //!
 //! This module contains parameters and axes, the conversion of cells to cases and of grids to lane plans, the presets,
 //! and the swept map. It contains no physics and no drawing. Cases and plans go to
-//! [`crate::engine`], maps to the report. The conformance tests use the cases of
+//! [`lanesweep_engine`], maps to the report. The conformance tests use the cases of
 //! the JRC's simulator.
 
 mod axis;
@@ -25,13 +25,13 @@ pub(crate) use robustness::without_reaction;
 pub use robustness::{Perturbation, VARIED};
 pub use run::{Map, MapGrids, MapOptions, MapResult, MappedGrid};
 
-pub use crate::scenario::CaseQuantity;
+pub use lanesweep_model::scenario::CaseQuantity;
 
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
-use crate::scenario::{Case, Category, NUMBERS, missing_parameter};
-use crate::support::ranges::refuse_repeats;
-use crate::{Error, Place, Result};
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scenario::{Case, Category, NUMBERS, missing_parameter};
+use lanesweep_support::ranges::refuse_repeats;
+use lanesweep_support::{Error, Place, Result};
 
 /// Maximum number of cells of a grid.
 const MAX_CELLS: usize = 1_000_000;
@@ -43,7 +43,7 @@ const MAX_PANELS: usize = 1000;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CaseStyle {
-    /// As `simulate` makes it: see [`PlainCase`](crate::scenario::PlainCase).
+    /// As `simulate` makes it: see [`PlainCase`](lanesweep_model::scenario::PlainCase).
     Plain,
     /// As the JRC's simulator makes it.
     Jrc,
@@ -301,7 +301,7 @@ impl Grid {
     /// The case of a cell.
     ///
     /// # Errors
-    /// [`Error::Usage`] for contradictory values, as [`PlainCase::case`](crate::scenario::PlainCase::case).
+    /// [`Error::Usage`] for contradictory values, as [`PlainCase::case`](lanesweep_model::scenario::PlainCase::case).
     pub fn case(&self, cell: usize, profile: &Profile) -> Result<Case> {
         let (point, dt_s) = (self.point(cell), profile.frame.dt_s);
         let value = |quantity, otherwise: f64| point.get(quantity).unwrap_or(otherwise);

@@ -2,11 +2,11 @@
 
 use std::sync::LazyLock;
 
-use crate::model::profile::Profile;
-use crate::scenario::{CaseNumber, CaseQuantity, Category, LANE_WIDTH_M, NUMBERS, PlainCase, check_headway};
-use crate::support::plain_text::nearest;
-use crate::support::plausibility::{Doubts, HELP, Quantity};
-use crate::{Error, Place, Result};
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scenario::{CaseNumber, CaseQuantity, Category, LANE_WIDTH_M, NUMBERS, PlainCase, check_headway};
+use lanesweep_support::plain_text::nearest;
+use lanesweep_support::plausibility::{Doubts, HELP, Quantity};
+use lanesweep_support::{Error, Place, Result};
 
 /// A parameter as named in flags, tables and files.
 #[derive(Debug, Clone, Copy, PartialEq)]

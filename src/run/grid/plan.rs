@@ -4,10 +4,10 @@
 
 use std::sync::Arc;
 
-use crate::engine::{Block, CaseTable, Headway, LaneCase, LanePlan};
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
-use crate::{Error, Place, Result};
+use lanesweep_engine::{Block, CaseTable, Headway, LaneCase, LanePlan};
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::profile::Profile;
+use lanesweep_support::{Error, Place, Result};
 
 use super::axis::GridAxis;
 use super::parameter::MapParameter;
@@ -51,7 +51,7 @@ impl GridPlan {
     /// Plans every cell with every model.
     ///
     /// # Errors
-    /// [`crate::Error::Usage`] without a model, and for an invalid case.
+    /// [`lanesweep_support::Error::Usage`] without a model, and for an invalid case.
     pub fn new(grid: Grid, profile: &Profile, models: &[ModelId]) -> Result<GridPlan> {
         let profile = grid.profile(profile);
         let mut groups: Vec<Vec<ModelId>> = Vec::new();

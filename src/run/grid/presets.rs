@@ -6,10 +6,10 @@
 //! the size of the evidence, 140,793 simulations: 4 models × 29,970 cut-ins, 3 × 209 decelerations, 3 × 6,762 cut-outs.
 //! No crash rate of Reg157 is published for these two; it runs there only if requested.
 
-use crate::Result;
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
-use crate::scenario::Category;
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scenario::Category;
+use lanesweep_support::Result;
 
 use super::axis::GridAxis;
 use super::parameter::MapParameter;

@@ -2,9 +2,9 @@
 //! ([`VARIED`]). If not, the case is *undecided*: rounding decides it, or measurements are not accurate enough.
 
 use super::parameter::Point;
-use crate::Result;
-use crate::model::profile::{MAX_STEPS, Profile};
-use crate::scenario::{CaseQuantity, Category, MeasurementError, NUMBERS};
+use lanesweep_model::profile::{MAX_STEPS, Profile};
+use lanesweep_model::scenario::{CaseQuantity, Category, MeasurementError, NUMBERS};
+use lanesweep_support::Result;
 
 /// The changes in words; a case has those of its inputs.
 pub const VARIED: &str = "a tenth of the time step; 0.1 km/h of a speed along the road; 0.01 m/s of the lateral speed; 0.05 m/s² of a \
@@ -69,7 +69,7 @@ impl Perturbation {
     /// The profile for the perturbed case.
     ///
     /// # Errors
-    /// [`crate::Error::Usage`] for a time step that is too short.
+    /// [`lanesweep_support::Error::Usage`] for a time step that is too short.
     pub(crate) fn profile(self, profile: &Profile) -> Result<Profile> {
         match self {
             Perturbation::FinerStep => {

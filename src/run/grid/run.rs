@@ -7,12 +7,12 @@ use super::map::GridMap;
 use super::plan::GridPlan;
 use super::presets::{self, Preset, Presets};
 use super::robustness::Perturbation;
-use crate::Result;
-use crate::engine::{CpuBackend, Executor, SweepSummary};
-use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
-use crate::scenario::Category;
+use lanesweep_engine::{CpuBackend, Executor, SweepSummary};
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scenario::Category;
+use lanesweep_support::Result;
 
 /// The cells of a map.
 #[derive(Debug, Clone)]
@@ -117,7 +117,7 @@ impl Map {
     /// Plans every cell of every grid with every model.
     ///
     /// # Errors
-    /// [`crate::Error::Usage`] without a model, and for an invalid case.
+    /// [`lanesweep_support::Error::Usage`] without a model, and for an invalid case.
     pub fn plan(options: MapOptions, profile: &Profile) -> Result<Map> {
         let is_published = matches!(options.grids, MapGrids::Preset(Presets::Jrc, _))
             && options.criterion == Criterion::Collision

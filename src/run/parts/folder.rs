@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 use super::Shard;
 use super::ledger::MergeableCounts;
 use super::sealed::{read_sealed, seal};
-use crate::support::files::write_inside;
-use crate::{Error, Place, Result};
+use lanesweep_support::files::write_inside;
+use lanesweep_support::{Error, Place, Result};
 
 /// Maximum number of parts listed by name in an error.
 const NAMED: usize = 10;

@@ -8,13 +8,13 @@ use super::Shard;
 use super::folder::{Part, read_part, read_parts, write_part};
 use super::journal::Journal;
 use super::ledger::{Ledger, MergeableCounts};
-use crate::engine::{Chunk, Executor, LanePlan, SweepSummary};
-use crate::stats::estimate::StopReason;
-use crate::support::files::make_folder;
-use crate::support::lock::FolderLock;
-use crate::support::readable::count;
-use crate::support::run_folder::{Results, RunFolder};
-use crate::{Error, Place, Result};
+use lanesweep_engine::{Chunk, Executor, LanePlan, SweepSummary};
+use lanesweep_stats::estimate::StopReason;
+use lanesweep_support::files::make_folder;
+use lanesweep_support::lock::FolderLock;
+use lanesweep_support::readable::count;
+use lanesweep_support::run_folder::{Results, RunFolder};
+use lanesweep_support::{Error, Place, Result};
 
 /// Receives the chunks of a sweep in order, with their plan.
 pub type EachChunk<'c> = dyn FnMut(&LanePlan, &Chunk) -> Result<()> + 'c;

@@ -13,11 +13,11 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::sealed::json_line;
-use crate::engine::ENGINE_VERSION;
-use crate::support::atomic_file::{is_named, refuse_link};
-use crate::support::files::remove_file;
-use crate::support::plain_text::hex;
-use crate::{Error, Place, Result};
+use lanesweep_engine::ENGINE_VERSION;
+use lanesweep_support::atomic_file::{is_named, refuse_link};
+use lanesweep_support::files::remove_file;
+use lanesweep_support::plain_text::hex;
+use lanesweep_support::{Error, Place, Result};
 
 /// Minimum time between two records.
 const MIN_WAIT: Duration = Duration::from_millis(250);

@@ -6,8 +6,8 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::journal::{Journal, Records};
-use crate::engine::{Partial, SampleTally};
-use crate::{Error, Result};
+use lanesweep_engine::{Partial, SampleTally};
+use lanesweep_support::{Error, Result};
 
 /// Counts over a set of units of one plan that can be merged in any order.
 pub trait MergeableCounts: Sized + Clone + Serialize + DeserializeOwned {
@@ -104,7 +104,7 @@ impl<T: MergeableCounts> Ledger<T> {
     }
 
     /// Adds the counts of a chunk, which must not cross a cut, with
-    /// [`Chunk::redone_and_rechecked`](crate::engine::Chunk). Writes to the journal periodically.
+    /// [`Chunk::redone_and_rechecked`](lanesweep_engine::Chunk). Writes to the journal periodically.
     ///
     /// # Errors
     /// [`Error::Io`] of the journal.

@@ -2,7 +2,7 @@
 //!
 //! A [`Job`] is computed in parts. A part is an interval of units. While it runs, a [`Ledger`] holds its counts and appends them to a journal; a
 //! finished part becomes a part file. Both identify their run by its hash. The types of the counts are in the
-//! [`engine`](crate::engine) and [`sampling`](crate::run::sampling).
+//! [`engine`](lanesweep_engine) and [`sampling`](crate::sampling).
 
 mod folder;
 mod job;

@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 use sha2::{Digest, Sha256};
 
-use crate::engine::ENGINE_VERSION;
-use crate::support::input_file::{ends, open, read};
-use crate::support::plain_text::hex;
-use crate::{Error, Place, Result};
+use lanesweep_engine::ENGINE_VERSION;
+use lanesweep_support::input_file::{ends, open, read};
+use lanesweep_support::plain_text::hex;
+use lanesweep_support::{Error, Place, Result};
 
 const VERSION: u64 = 3;
 

@@ -4,10 +4,10 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, ErrorKind, Read, Seek, Write};
 use std::path::Path;
 
-use crate::support::files::write_inside;
-use crate::support::input_file;
-use crate::support::run_folder::RunFolder;
-use crate::{Error, Place, Result};
+use lanesweep_support::files::write_inside;
+use lanesweep_support::input_file;
+use lanesweep_support::run_folder::RunFolder;
+use lanesweep_support::{Error, Place, Result};
 
 /// File name of the plan in a run's folder.
 pub const PLAN_FILE: &str = "plan.json";

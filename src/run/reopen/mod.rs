@@ -11,18 +11,18 @@ use std::path::Path;
 
 pub use traced::{TracedCase, TracedLane, TracedLanes};
 
-use crate::engine::{Headway, LaneKey, LanePlan};
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
-use crate::run::parts::{PLAN_FILE, kind_of};
-use crate::run::sampling::{Sample, SampleKind};
-use crate::run::study::{Study, StudyOptions, plan_study};
-use crate::scenario::Scenario;
-use crate::stats::density::DensityModel;
-use crate::support::files::check_run_folder;
-use crate::support::ranges::refuse_repeats;
-use crate::support::run_folder::{ESTIMATE_RECORD, STUDY_RECORD};
-use crate::{Error, Place, Result};
+use crate::parts::{PLAN_FILE, kind_of};
+use crate::sampling::{Sample, SampleKind};
+use crate::study::{Study, StudyOptions, plan_study};
+use lanesweep_engine::{Headway, LaneKey, LanePlan};
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scenario::Scenario;
+use lanesweep_stats::density::DensityModel;
+use lanesweep_support::files::check_run_folder;
+use lanesweep_support::ranges::refuse_repeats;
+use lanesweep_support::run_folder::{ESTIMATE_RECORD, STUDY_RECORD};
+use lanesweep_support::{Error, Place, Result};
 
 /// Lanes that can be rerun.
 pub struct Reopened {
@@ -139,7 +139,7 @@ impl Reopened {
     /// Passes the plan with the cases of these lanes to `work`.
     ///
     /// # Errors
-    /// Those of `work`, and as [`StudyCases::window`](crate::run::study::StudyCases::window).
+    /// Those of `work`, and as [`StudyCases::window`](crate::study::StudyCases::window).
     pub fn with_cases<T>(&self, keys: &[LaneKey], work: impl FnOnce(&LanePlan) -> Result<T>) -> Result<T> {
         let Some(study) = self.as_study() else { return work(self.plan()) };
         let units = keys.iter().map(|key| study.plan().blocks[key.block].first_unit + key.unit);

@@ -5,16 +5,16 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use crate::engine::{ENGINE_VERSION, Headway, LanePlan};
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
-use crate::run::parts::{PLAN_FILE, RUN_PLAN_FILE, kind_of};
-use crate::run::sampling::{Estimator, SampleHeadways, SampleOptions, plan_samples};
-use crate::run::study::Study;
-use crate::stats::density::{DensityModel, read_density};
-use crate::support::input_file::{MAX_TABLE_BYTES, read_json};
-use crate::support::run_folder::{ESTIMATE_RECORD, STUDY_RECORD};
-use crate::{Error, Place, Result};
+use crate::parts::{PLAN_FILE, RUN_PLAN_FILE, kind_of};
+use crate::sampling::{Estimator, SampleHeadways, SampleOptions, plan_samples};
+use crate::study::Study;
+use lanesweep_engine::{ENGINE_VERSION, Headway, LanePlan};
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::profile::Profile;
+use lanesweep_stats::density::{DensityModel, read_density};
+use lanesweep_support::input_file::{MAX_TABLE_BYTES, read_json};
+use lanesweep_support::run_folder::{ESTIMATE_RECORD, STUDY_RECORD};
+use lanesweep_support::{Error, Place, Result};
 
 /// Crude Monte Carlo of a folder: the plan, remade from the density beside the record, and the density.
 pub(super) fn sample_of(dir: &Path) -> Result<(LanePlan, DensityModel)> {

@@ -1,14 +1,14 @@
 //! Lanes with every step: a reopened lane with other variants and models of its scenario, or the lanes of one case.
 
 use super::Reopened;
-use crate::engine::{Headway, LaneCase, LaneKey, LanePlan, LaneRunner, Outcome, Trace, check_time_step};
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
-use crate::model::scalar::Real;
-use crate::scenario::parameterization::{Sizes, VehicleSize};
-use crate::scenario::{Case, Tables};
-use crate::support::ranges::refuse_repeats;
-use crate::{Error, Place, Result};
+use lanesweep_engine::{Headway, LaneCase, LaneKey, LanePlan, LaneRunner, Outcome, Trace, check_time_step};
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scalar::Real;
+use lanesweep_model::scenario::parameterization::{Sizes, VehicleSize};
+use lanesweep_model::scenario::{Case, Tables};
+use lanesweep_support::ranges::refuse_repeats;
+use lanesweep_support::{Error, Place, Result};
 
 /// A lane with every step.
 pub struct TracedLane {

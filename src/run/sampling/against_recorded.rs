@@ -10,15 +10,15 @@ use super::estimate_rows::{EstimateRow, RecordedRatios};
 use super::plan::{plan_draws, plan_points};
 use super::result::SampleResult;
 use super::sample_options::SampleHeadways;
-use crate::engine::{CpuBackend, Executor, Headway, KernelCounts, LanePlan, Verdicts, Wanted, cell_of};
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
-use crate::random::Stream;
-use crate::run::study::{StudyOptions, plan_study};
-use crate::scenario::Category;
-use crate::stats::density::DensityModel;
-use crate::stats::estimate::{Clusters, Ratio, RatioVerdict, Warning, paired_ratio};
-use crate::{Error, Result};
+use crate::study::{StudyOptions, plan_study};
+use lanesweep_engine::{CpuBackend, Executor, Headway, KernelCounts, LanePlan, Verdicts, Wanted, cell_of};
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scenario::Category;
+use lanesweep_random::Stream;
+use lanesweep_stats::density::DensityModel;
+use lanesweep_stats::estimate::{Clusters, Ratio, RatioVerdict, Warning, paired_ratio};
+use lanesweep_support::{Error, Result};
 
 /// The lanes of S and of S' under the density's parameterization, with scenarios as kernels. `None` if the density
 /// cannot be replayed.

@@ -7,11 +7,11 @@ use std::time::Instant;
 use super::result::SampleResult;
 use super::sample_options::{Estimator, SampleOptions};
 use super::{EstimateRow, Question, Sample};
-use crate::Result;
-use crate::engine::Executor;
-use crate::model::driver::ModelId;
-use crate::stats::density::normal_quantile;
-use crate::stats::estimate::{Goal, Search, StopRule};
+use lanesweep_engine::Executor;
+use lanesweep_model::driver::ModelId;
+use lanesweep_stats::density::normal_quantile;
+use lanesweep_stats::estimate::{Goal, Search, StopRule};
+use lanesweep_support::Result;
 
 /// Samples of the pilot.
 const PILOT: u64 = 10_000;

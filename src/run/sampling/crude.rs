@@ -7,13 +7,13 @@ use serde::Serialize;
 
 use super::estimate_rows::{EstimateRow, crude_rows};
 use super::sample_options::SampleOptions;
-use crate::engine::{Executor, LanePlan, SampleTally, SweepSummary, Wanted};
-use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
-use crate::run::parts::{Computed, EachChunk, Ledger};
-use crate::stats::density::Exposure;
-use crate::stats::estimate::{StopReason, StopRule, next_checkpoint};
-use crate::{Error, Place, Result};
+use crate::parts::{Computed, EachChunk, Ledger};
+use lanesweep_engine::{Executor, LanePlan, SampleTally, SweepSummary, Wanted};
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::ModelId;
+use lanesweep_stats::density::Exposure;
+use lanesweep_stats::estimate::{StopReason, StopRule, next_checkpoint};
+use lanesweep_support::{Error, Place, Result};
 
 /// Estimates after a number of samples.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -6,11 +6,11 @@ use serde::Serialize;
 use super::against_recorded::NoTraffic;
 use super::sample_options::SampleOptions;
 use super::uncertainty::Uncertainty;
-use crate::engine::{LanePlan, SampleTally, cell_of};
-use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
-use crate::stats::density::{Exposure, Rate, normal_quantile};
-use crate::stats::estimate::{
+use lanesweep_engine::{LanePlan, SampleTally, cell_of};
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::ModelId;
+use lanesweep_stats::density::{Exposure, Rate, normal_quantile};
+use lanesweep_stats::estimate::{
     Clusters, Counts, Estimate, Interval, Ratio, StopReason, Warning, cluster_rate, from_clusters, from_counts,
 };
 
@@ -219,8 +219,8 @@ impl Risk {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scenario::Driven;
-    use crate::stats::estimate::{BinomialInterval, Counts, StopReason, from_counts};
+    use lanesweep_model::scenario::Driven;
+    use lanesweep_stats::estimate::{BinomialInterval, Counts, StopReason, from_counts};
 
     #[test]
     fn risk_without_failures_is_bounded_and_not_zero() {

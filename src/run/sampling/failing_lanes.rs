@@ -9,11 +9,11 @@ use rayon::prelude::*;
 use super::limit_state::truncated;
 use super::plan::plan_points;
 use super::{Question, Sample, SampleKind, SampleResult};
-use crate::engine::{CpuBackend, Executor, LanePlan, Outcome, SampleTally, Wanted, cell_of};
-use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
-use crate::model::scalar::Real;
-use crate::{Error, Result};
+use lanesweep_engine::{CpuBackend, Executor, LanePlan, Outcome, SampleTally, Wanted, cell_of};
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::scalar::Real;
+use lanesweep_support::{Error, Result};
 
 /// Samples whose points are drawn together.
 const PIECE: u64 = 1 << 13;

@@ -1,17 +1,17 @@
 //! Makes a case generator from a parameter space and a mixture.
 
-use crate::engine::attention_rules;
-use crate::engine::generated::{
+use lanesweep_engine::attention_rules;
+use lanesweep_engine::generated::{
     CasePath, ColumnBound, Generator, LateralPath, MAX_BOUNDS, MAX_PARAMETERS, NO_SLOT, PointSource, Points, Recipe,
     ReducedColumns,
 };
-use crate::model::profile::{CutOutEvaluated, CutOutTarget, Profile};
-use crate::model::scalar::Real;
-use crate::random::Stream;
-use crate::scenario::Category;
-use crate::scenario::parameterization::{AfterDuration, ReducedSeries, Sizes, Variable};
-use crate::stats::density::{Kde, ParameterSpace};
-use crate::{Error, Place, Result};
+use lanesweep_model::profile::{CutOutEvaluated, CutOutTarget, Profile};
+use lanesweep_model::scalar::Real;
+use lanesweep_model::scenario::Category;
+use lanesweep_model::scenario::parameterization::{AfterDuration, ReducedSeries, Sizes, Variable};
+use lanesweep_random::Stream;
+use lanesweep_stats::density::{Kde, ParameterSpace};
+use lanesweep_support::{Error, Place, Result};
 
 /// Purpose of the random stream of the samples.
 pub const SAMPLE_PURPOSE: u32 = 0x5341_4d50;

@@ -5,14 +5,14 @@ use std::ops::Range;
 
 use super::plan::{plan_draws, plan_points};
 use super::sample_options::{Question, SampleHeadways};
-use crate::Result;
-use crate::engine::{Executor, Outcome, Wanted};
-use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
-use crate::random::Stream;
-use crate::stats::density::{DensityModel, Mixture};
-use crate::stats::estimate::{Density, Failure, KernelShares, LimitState, Truncated, kernel_shares};
+use lanesweep_engine::{Executor, Outcome, Wanted};
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::profile::Profile;
+use lanesweep_random::Stream;
+use lanesweep_stats::density::{DensityModel, Mixture};
+use lanesweep_stats::estimate::{Density, Failure, KernelShares, LimitState, Truncated, kernel_shares};
+use lanesweep_support::Result;
 
 /// Value far from any failure: the ego never closed in.
 const FAR: f64 = 1e3;

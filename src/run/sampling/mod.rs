@@ -1,7 +1,7 @@
 //! Sampling: a density becomes lanes, and their outcomes become probabilities of failure.
 //!
 //! [`Sample`] is the entry point: it plans a run of any estimator, runs it whole or in shards, resumes and merges it.
-//! Densities and estimators come from [`crate::stats`]; lanes run in [`crate::engine`].
+//! Densities and estimators come from [`lanesweep_stats`]; lanes run in [`lanesweep_engine`].
 
 mod against_recorded;
 mod cheaper_estimator;
@@ -37,12 +37,12 @@ pub use weighted::WeightedTally;
 
 use std::path::Path;
 
-use crate::engine::{Executor, LanePlan};
-use crate::model::profile::Profile;
-use crate::run::parts::PLAN_FILE;
-use crate::stats::density::{DensityModel, Mixture};
-use crate::stats::estimate::{Importance, Search, SearchRun};
-use crate::{Error, Result};
+use crate::parts::PLAN_FILE;
+use lanesweep_engine::{Executor, LanePlan};
+use lanesweep_model::profile::Profile;
+use lanesweep_stats::density::{DensityModel, Mixture};
+use lanesweep_stats::estimate::{Importance, Search, SearchRun};
+use lanesweep_support::{Error, Result};
 
 /// A planned sampling run: whole, or one shard of it if its samples are independent.
 ///

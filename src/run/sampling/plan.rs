@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use crate::engine::generated::Generator;
-use crate::engine::{Block, Headway, LanePlan, Units};
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
-use crate::random::Stream;
-use crate::stats::density::DensityModel;
-use crate::{Error, Place, Result};
+use lanesweep_engine::generated::Generator;
+use lanesweep_engine::{Block, Headway, LanePlan, Units};
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::profile::Profile;
+use lanesweep_random::Stream;
+use lanesweep_stats::density::DensityModel;
+use lanesweep_support::{Error, Place, Result};
 
 use super::generator::{SAMPLE_PURPOSE, generator_of, generator_of_points};
 use super::sample_options::{SampleHeadways, SampleOptions};

@@ -9,13 +9,13 @@ use super::plan::plan_samples;
 use super::proposal_file::{proposal_from_text, proposal_text};
 use super::sample_options::{Estimator, SampleOptions};
 use super::{Sample, SampleKind, Weighted};
-use crate::model::profile::Profile;
-use crate::run::parts::{kind_of, read_sealed, seal};
-use crate::stats::density::DensityModel;
-use crate::stats::estimate::{Importance, SearchRun};
-use crate::support::atomic_file::refuse_link;
-use crate::support::files::{make_folder, write_inside};
-use crate::{Error, Place, Result};
+use crate::parts::{kind_of, read_sealed, seal};
+use lanesweep_model::profile::Profile;
+use lanesweep_stats::density::DensityModel;
+use lanesweep_stats::estimate::{Importance, SearchRun};
+use lanesweep_support::atomic_file::refuse_link;
+use lanesweep_support::files::{make_folder, write_inside};
+use lanesweep_support::{Error, Place, Result};
 
 /// File of a run with its own search; kept until the run ends.
 pub(super) const SEARCH_FILE: &str = "search.json";

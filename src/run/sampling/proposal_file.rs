@@ -5,9 +5,9 @@ use std::path::Path;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-use crate::stats::density::{DensityModel, MAX_FILE_BYTES, Mixture};
-use crate::support::input_file;
-use crate::{Error, Place, Result};
+use lanesweep_stats::density::{DensityModel, MAX_FILE_BYTES, Mixture};
+use lanesweep_support::input_file;
+use lanesweep_support::{Error, Place, Result};
 
 const VERSION: u64 = 1;
 

@@ -2,8 +2,8 @@
 
 use super::crude::CrudeRun;
 use super::estimate_rows::EstimateRow;
-use crate::stats::density::Mixture;
-use crate::stats::estimate::SearchRound;
+use lanesweep_stats::density::Mixture;
+use lanesweep_stats::estimate::SearchRound;
 
 /// Result of a sampling run.
 #[derive(Debug, Clone, Default)]

@@ -2,11 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::engine::Headway;
-use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
-use crate::stats::density::Mixture;
-use crate::stats::estimate::{BinomialInterval, Goal, Search, StopRule};
+use lanesweep_engine::Headway;
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::ModelId;
+use lanesweep_stats::density::Mixture;
+use lanesweep_stats::estimate::{BinomialInterval, Goal, Search, StopRule};
 
 /// How probabilities are estimated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

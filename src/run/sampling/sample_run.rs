@@ -8,12 +8,12 @@ use super::plan_file::SEARCH_FILE;
 use super::result::SampleResult;
 use super::weighted::WeightedTally;
 use super::{Sample, SampleHeadways, SampleKind, Weighted};
-use crate::engine::{Executor, LanePlan, SampleTally, SweepSummary};
-use crate::run::parts::{Computed, EachChunk, Job, Ledger, MergeableCounts, PLAN_FILE, Shard, leave_plan};
-use crate::stats::density::Exposure;
-use crate::support::files::remove_file;
-use crate::support::run_folder::ESTIMATE_RECORD;
-use crate::{Error, Place, Result};
+use crate::parts::{Computed, EachChunk, Job, Ledger, MergeableCounts, PLAN_FILE, Shard, leave_plan};
+use lanesweep_engine::{Executor, LanePlan, SampleTally, SweepSummary};
+use lanesweep_stats::density::Exposure;
+use lanesweep_support::files::remove_file;
+use lanesweep_support::run_folder::ESTIMATE_RECORD;
+use lanesweep_support::{Error, Place, Result};
 
 /// Evaluates an expression for the job of a planned sample.
 macro_rules! with_job {

@@ -10,13 +10,13 @@ use super::limit_state::{LaneLimitState, scenario_shares, truncated};
 use super::result::SampleResult;
 use super::sample_options::Question;
 use super::{Sample, Weighted};
-use crate::engine::{CpuBackend, Executor, lanes_within_seconds};
-use crate::run::parts::{Ledger, MergeableCounts};
-use crate::stats::estimate::{
+use crate::parts::{Ledger, MergeableCounts};
+use lanesweep_engine::{CpuBackend, Executor, lanes_within_seconds};
+use lanesweep_stats::estimate::{
     BlockSums, Estimate, Found, Importance, Search, WeightSums, from_weight_sums, importance_sums, search,
 };
-use crate::support::cancel::Cancel;
-use crate::{Error, Place, Result};
+use lanesweep_support::cancel::Cancel;
+use lanesweep_support::{Error, Place, Result};
 
 /// Maximum number of samples evaluated between two journal updates.
 const CHUNK: u64 = 1 << 16;
@@ -180,8 +180,8 @@ impl MergeableCounts for WeightedTally {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::criterion::Criterion;
-    use crate::model::driver::ModelId;
+    use lanesweep_model::criterion::Criterion;
+    use lanesweep_model::driver::ModelId;
 
     /// Cancellation is checked after a bounded number of lane-steps and of weighted kernels, for every time step.
     #[test]

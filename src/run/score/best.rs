@@ -3,10 +3,10 @@
 use super::claims::units_of;
 use super::difference::{Contrast, ScenarioRate, ScoreInterval, min_contrast};
 use super::{CategoryScores, ScoreTable, f1};
-use crate::engine::{LanePlan, Partial, UnitCounts};
-use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
-use crate::scenario::Category;
+use lanesweep_engine::{LanePlan, Partial, UnitCounts};
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::scenario::Category;
 
 /// The best parameterization of one category for one model.
 #[derive(Debug, Clone, PartialEq)]

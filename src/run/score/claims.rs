@@ -11,10 +11,10 @@ use super::ScoreTable;
 use super::difference::ScoreInterval;
 use super::paper_claims::{Claim, paper_claims};
 use super::statistic::{Scenarios, Statistic};
-use crate::engine::{Headway, LanePlan, Partial, UnitCounts};
-use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
-use crate::scenario::Category;
+use lanesweep_engine::{Headway, LanePlan, Partial, UnitCounts};
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::scenario::Category;
 
 /// Bound of a claimed equality of F1.
 const NEAR: f64 = 0.05;
@@ -140,7 +140,7 @@ pub fn check_claims(table: &ScoreTable, plan: &LanePlan, counts: &Partial) -> Ve
 
 /// The counts of a category's scenarios.
 pub(super) fn units_of<'a>(plan: &LanePlan, counts: &'a Partial, category: Category) -> &'a [UnitCounts] {
-    let range = |block: &crate::engine::Block| {
+    let range = |block: &lanesweep_engine::Block| {
         let first = block.first_unit as usize;
         first..first + block.units.len() as usize
     };
@@ -185,8 +185,8 @@ mod tests {
     use super::super::CategoryScores;
     use super::super::published::PAPER_MODELS;
     use super::*;
-    use crate::engine::Confusion;
-    use crate::run::score::ScoreOptions;
+    use crate::score::ScoreOptions;
+    use lanesweep_engine::Confusion;
 
     const VARIANTS: [&str; 8] = ["S", "a", "b", "c", "d", "e", "f", "g"];
     const GOOD: Confusion<u32> = Confusion { tp: 9, fn_: 1, fp: 1, tn: 0 };

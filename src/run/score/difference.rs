@@ -4,8 +4,8 @@
 //! correlation of the scores (Zou, "Toward using confidence intervals to compare correlations", Psychological Methods
 //! 12, 2007). Percentiles of resampled differences have a much lower coverage: see the chapter on validation.
 
-use crate::engine::Confusion;
-use crate::stats::estimate::{Clusters, cluster_rate};
+use lanesweep_engine::Confusion;
+use lanesweep_stats::estimate::{Clusters, cluster_rate};
 
 /// Ends of an interval.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,9 +1,9 @@
 //! Failed lanes by headway, of S and of every S'.
 
-use crate::engine::{Headway, LanePlan, Partial};
-use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
-use crate::{Error, Result};
+use lanesweep_engine::{Headway, LanePlan, Partial};
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::ModelId;
+use lanesweep_support::{Error, Result};
 
 /// Failed lanes of one category by headway.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,9 +3,9 @@
 use super::claims::units_of;
 use super::difference::{Contrast, ScenarioRate, ScoreInterval, min_contrast};
 use super::{CategoryScores, ScoreOptions, f1};
-use crate::engine::{LanePlan, Partial};
-use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
+use lanesweep_engine::{LanePlan, Partial};
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::ModelId;
 
 /// Mean F1 over the cells whose F1 is defined for every parameterization.
 #[derive(Debug, Clone, PartialEq)]

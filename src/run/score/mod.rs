@@ -2,7 +2,7 @@
 //!
 //! This module contains recall, precision and F1 ([`ScoreTable`]), intervals of their differences over scenarios, and
 //! the best parameterizations. It also contains the paper's claims as data with their verdicts, and the paper's
-//! published numbers. It contains nothing about lanes. Counts come from [`crate::engine`]'s partials; scores go to
+//! published numbers. It contains nothing about lanes. Counts come from [`lanesweep_engine`]'s partials; scores go to
 //! the report.
 
 mod best;
@@ -27,12 +27,12 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::engine::{Confusion, Headway, LanePlan, Partial, UnitCounts};
-use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
-use crate::scenario::Category;
-use crate::support::ranges;
-use crate::{Error, Place, Result, settings};
+use lanesweep_engine::{Confusion, Headway, LanePlan, Partial, UnitCounts};
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::scenario::Category;
+use lanesweep_support::ranges;
+use lanesweep_support::{Error, Place, Result, settings};
 
 /// Ending of the name of a parameterization that replays each scenario by a basis that has not seen it.
 pub const CROSS_VALIDATED: &str = "-cv";

@@ -2,9 +2,9 @@
 
 use super::published::PAPER_MODELS;
 use super::statistic::Statistic;
-use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
-use crate::scenario::Category;
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::scenario::Category;
 
 /// A claim as data.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,9 +3,9 @@
 //! should agree qualitatively, not in these numbers.
 
 use super::{ScoreTable, f1};
-use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
-use crate::scenario::Category;
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::scenario::Category;
 
 /// Failures of the recorded scenarios.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

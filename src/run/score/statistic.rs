@@ -2,9 +2,9 @@
 
 use super::CategoryScores;
 use super::difference::{Contrast, ScenarioRate, ScoreInterval, min_contrast};
-use crate::engine::{Confusion, UnitCounts};
-use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
+use lanesweep_engine::{Confusion, UnitCounts};
+use lanesweep_model::criterion::Criterion;
+use lanesweep_model::driver::ModelId;
 
 /// A number whose sign (or closeness to 0) a claim is about.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -155,7 +155,7 @@ mod tests {
         let cells =
             vec![Confusion { tp: 4, tn: 6, ..Confusion::default() }, Confusion::default(), Confusion::default()];
         let scores = CategoryScores {
-            category: crate::scenario::Category::CutOut,
+            category: lanesweep_model::scenario::Category::CutOut,
             scenarios: 20,
             simulations: 200,
             variants,

@@ -6,15 +6,15 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use crate::engine::lane_case::LaneCase;
-use crate::engine::plan::{Block, LanePlan, Units, check_cases};
-use crate::engine::{CaseTable, Chunk, Executor, SweepSummary, Wanted};
-use crate::run::study::plan_file::StudyHead;
-use crate::scenario::parameterization::{
+use crate::study::plan_file::StudyHead;
+use lanesweep_engine::lane_case::LaneCase;
+use lanesweep_engine::plan::{Block, LanePlan, Units, check_cases};
+use lanesweep_engine::{CaseTable, Chunk, Executor, SweepSummary, Wanted};
+use lanesweep_model::scenario::parameterization::{
     Parameterization, ParameterizationOptions, Reduction, Sizes, TimeGrid, recorded_case, steps_of,
 };
-use crate::scenario::{Case, Category, Scenario};
-use crate::{Error, Place, Result};
+use lanesweep_model::scenario::{Case, Category, Scenario};
+use lanesweep_support::{Error, Place, Result};
 
 /// The input of a study's cases, or of an interval of its scenarios: about 2 kB per scenario. Cases are ten times as
 /// large; they are made for one window of scenarios at a time.
@@ -216,12 +216,12 @@ fn cases_of(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::Headway;
-    use crate::model::profile::Profile;
-    use crate::run::study::plan::{StudyOptions, outline_study};
-    use crate::scenario::Tables;
-    use crate::traffic::mining::{MiningOptions, mine_generated};
-    use crate::traffic::trajectory::generator::GeneratorOptions;
+    use crate::study::plan::{StudyOptions, outline_study};
+    use lanesweep_engine::Headway;
+    use lanesweep_model::profile::Profile;
+    use lanesweep_model::scenario::Tables;
+    use lanesweep_traffic::mining::{MiningOptions, mine_generated};
+    use lanesweep_traffic::trajectory::generator::GeneratorOptions;
 
     fn scenarios() -> Vec<Scenario> {
         let options = GeneratorOptions { recordings: 4, ..GeneratorOptions::default() };

@@ -1,10 +1,10 @@
 //! What the counts of a whole study say: scores, claims, and the numbers of its figures.
 
 use super::Study;
-use crate::Result;
-use crate::engine::Partial;
-use crate::model::criterion::Criterion;
-use crate::run::score::{Best, ClaimResult, HeadwayFailures, MeanF1, ScoreTable, best_parameterizations, check_claims};
+use crate::score::{Best, ClaimResult, HeadwayFailures, MeanF1, ScoreTable, best_parameterizations, check_claims};
+use lanesweep_engine::Partial;
+use lanesweep_model::criterion::Criterion;
+use lanesweep_support::Result;
 
 /// What the counts of one category say in addition to its scores.
 #[derive(Debug, Clone)]

@@ -6,11 +6,13 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::folds::folds;
-use crate::run::score::CROSS_VALIDATED;
-use crate::scenario::parameterization::{Parameterization, ParameterizationOptions, ReducedScenario, Reduction};
-use crate::scenario::{Category, Scenario, ScenarioFile, read_scenario_file};
-use crate::support::plausibility::Implausible;
-use crate::{Error, Place, Result};
+use crate::score::CROSS_VALIDATED;
+use lanesweep_model::scenario::parameterization::{
+    Parameterization, ParameterizationOptions, ReducedScenario, Reduction,
+};
+use lanesweep_model::scenario::{Category, Scenario, ScenarioFile, read_scenario_file};
+use lanesweep_support::plausibility::Implausible;
+use lanesweep_support::{Error, Place, Result};
 
 /// S' of the scenarios of a category, by their ids.
 #[derive(Debug, Clone, PartialEq)]
@@ -96,6 +98,24 @@ impl ExternalReplay {
             if let Some(missing) = missing {
                 let problem = format!("scenario {} is missing; others of its category are there", missing.id);
                 return Err(Error::input(place(), problem, "give all kept scenarios of a category, or none"));
+            }
+            // Rows that were shifted or sorted have the ids of other scenarios.
+            let pairs: Vec<_> = scenarios.iter().filter_map(|s| Some((s, replay.scenarios.get(&s.id)?))).collect();
+            let difference = |(s, own): (&Scenario, &ReducedScenario)| {
+                let ends = [(s.target.v.first(), own.v.first()), (s.target.v.last(), own.v.last())];
+                ends.iter().map(|(a, b)| (a.unwrap_or(&0.0) - b.unwrap_or(&0.0)).abs()).sum::<f64>()
+            };
+            let is_nearer = |(pair, next): &(_, &(&Scenario, _))| difference(*pair) <= difference((next.0, pair.1));
+            let next = pairs.iter().cycle().skip(1);
+            let near = pairs.iter().copied().zip(next).filter(is_nearer).count();
+            if pairs.len() >= 4 && 4 * near < 3 * pairs.len() {
+                tracing::warn!(
+                    "{}: only {near} of {} S' of the {}s begin and end with the speeds of their own scenario rather than \
+                     of the next one: check the ids",
+                    path.display(),
+                    pairs.len(),
+                    replay.category.label()
+                );
             }
         }
         Ok(replays.into_values().collect())

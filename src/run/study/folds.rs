@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::scenario::Scenario;
-use crate::{Error, Place, Result};
+use lanesweep_model::scenario::Scenario;
+use lanesweep_support::{Error, Place, Result};
 
 /// The fold of each scenario, below `count`. Recordings go to the fold with the fewest scenarios, the largest first. Fewer
 /// recordings than folds are cut into as many stretches of time.
@@ -43,9 +43,9 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
-    use crate::scenario::Category;
-    use crate::traffic::mining::{MiningOptions, mine_generated};
-    use crate::traffic::trajectory::generator::GeneratorOptions;
+    use lanesweep_model::scenario::Category;
+    use lanesweep_traffic::mining::{MiningOptions, mine_generated};
+    use lanesweep_traffic::trajectory::generator::GeneratorOptions;
 
     #[test]
     fn scenarios_of_a_recording_stay_together() {

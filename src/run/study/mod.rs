@@ -32,13 +32,13 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::engine::{LanePlan, Partial};
-use crate::model::profile::Profile;
-use crate::run::parts::{Shard, read_sealed_line, seal, units_of};
-use crate::run::score::{ScoreOptions, ScoreTable, score};
-use crate::support::run_folder::Results;
-use crate::traffic::mining::{Collection, MiningOptions, counts, counts_text};
-use crate::{Error, Place, Result};
+use crate::parts::{Shard, read_sealed_line, seal, units_of};
+use crate::score::{ScoreOptions, ScoreTable, score};
+use lanesweep_engine::{LanePlan, Partial};
+use lanesweep_model::profile::Profile;
+use lanesweep_support::run_folder::Results;
+use lanesweep_support::{Error, Place, Result};
+use lanesweep_traffic::mining::{Collection, MiningOptions, counts, counts_text};
 
 /// Maximum size of the first line that is read, bytes: checksums of the pages of scenarios, data of the recordings.
 const MAX_HEAD_BYTES: u64 = 1 << 30;
@@ -139,7 +139,7 @@ impl StudyBuilder<'_> {
         StudyBuilder { published, ..self }
     }
 
-    /// Declares that the lanes run in f64, by [`CpuBackend::reference`](crate::engine::CpuBackend::reference).
+    /// Declares that the lanes run in f64, by [`CpuBackend::reference`](lanesweep_engine::CpuBackend::reference).
     pub fn reference(self, reference: bool) -> Self {
         StudyBuilder { reference, ..self }
     }

@@ -1,7 +1,7 @@
 //! Root mean square errors of the motions of S', in standard deviations of the recorded series.
 
-use crate::engine::LaneCase;
-use crate::scenario::{Category, Tables};
+use lanesweep_engine::LaneCase;
+use lanesweep_model::scenario::{Category, Tables};
 
 /// Number of series: speed, distance from the lane's middle, speed of the vehicle ahead.
 const SERIES: usize = 3;

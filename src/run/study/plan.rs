@@ -1,17 +1,17 @@
 //! Plans a study: mined scenarios and options become cases; sizes are limited before anything is allocated.
 
-use crate::engine::plan::{Headway, LanePlan};
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
-use crate::run::study::cases::{StudyCases, entries_per_step, parameterizations};
-use crate::run::study::external_replays::{ExternalReplay, held_out};
-use crate::run::study::plan_file::{BlockHead, StudyHead, stripped};
-use crate::scenario::parameterization::{
+use crate::study::cases::{StudyCases, entries_per_step, parameterizations};
+use crate::study::external_replays::{ExternalReplay, held_out};
+use crate::study::plan_file::{BlockHead, StudyHead, stripped};
+use lanesweep_engine::plan::{Headway, LanePlan};
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scenario::parameterization::{
     ParameterizationOptions, ReducedScenario, Reduction, SvdFit, TimeGrid, steps_of, vehicle_ahead,
 };
-use crate::scenario::{Category, Scenario};
-use crate::support::ranges::refuse_repeats;
-use crate::{Error, Place, Result};
+use lanesweep_model::scenario::{Category, Scenario};
+use lanesweep_support::ranges::refuse_repeats;
+use lanesweep_support::{Error, Place, Result};
 
 /// Options of a study.
 #[derive(Debug, Clone)]

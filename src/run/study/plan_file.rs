@@ -5,14 +5,14 @@
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::engine::plan::Headway;
-use crate::engine::version::Canonical;
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
-use crate::scenario::parameterization::{Parameterization, ParameterizationOptions, Reduction, SvdBasis};
-use crate::scenario::{Category, Scenario};
-use crate::support::plain_text::hex;
-use crate::{Error, Result};
+use lanesweep_engine::plan::Headway;
+use lanesweep_engine::version::Canonical;
+use lanesweep_model::driver::ModelId;
+use lanesweep_model::profile::Profile;
+use lanesweep_model::scenario::parameterization::{Parameterization, ParameterizationOptions, Reduction, SvdBasis};
+use lanesweep_model::scenario::{Category, Scenario};
+use lanesweep_support::plain_text::hex;
+use lanesweep_support::{Error, Result};
 
 /// Number of scenarios in a page.
 pub(super) const PAGE: u64 = 64;

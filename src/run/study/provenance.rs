@@ -7,16 +7,16 @@ use super::StudyOptions;
 use super::cases::{StudyCases, WINDOW};
 use super::folds::folds;
 use super::motion_error::{MotionError, MotionSpread};
-use crate::Result;
-use crate::engine::Block;
-use crate::run::score::{CROSS_VALIDATED, ScoreOptions};
-use crate::scenario::parameterization::{
+use crate::score::{CROSS_VALIDATED, ScoreOptions};
+use lanesweep_engine::Block;
+use lanesweep_model::scenario::parameterization::{
     ModeShape, Parameter, Parameterization, ParameterizationOptions, Reduction, SpeedProfile,
 };
-use crate::scenario::{Category, Scenario};
-use crate::stats::density::ParameterSpace;
-use crate::support::readable::plain_step;
-use crate::traffic::mining::{Collection, MiningOptions, RecordingSummary, count};
+use lanesweep_model::scenario::{Category, Scenario};
+use lanesweep_stats::density::ParameterSpace;
+use lanesweep_support::Result;
+use lanesweep_support::readable::plain_step;
+use lanesweep_traffic::mining::{Collection, MiningOptions, RecordingSummary, count};
 
 /// One category's scenarios.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -8,11 +8,11 @@ use sha2::{Digest, Sha256};
 
 use super::cases::{StudyCases, parameterizations};
 use super::plan_file::{PAGE, StudyHead, lines, stripped};
-use crate::engine::{Block, CaseTable, LanePlan, Units};
-use crate::scenario::Scenario;
-use crate::scenario::parameterization::Reduction;
-use crate::support::plain_text::hex;
-use crate::{Error, Place, Result};
+use lanesweep_engine::{Block, CaseTable, LanePlan, Units};
+use lanesweep_model::scenario::Scenario;
+use lanesweep_model::scenario::parameterization::Reduction;
+use lanesweep_support::plain_text::hex;
+use lanesweep_support::{Error, Place, Result};
 
 impl StudyHead {
     /// The study with some of its scenarios; `first_held` is the unit of the first one.
@@ -112,10 +112,10 @@ mod tests {
     use std::io::{Cursor, SeekFrom};
 
     use super::*;
-    use crate::model::profile::Profile;
-    use crate::run::study::plan::{StudyOptions, outline_study};
-    use crate::traffic::mining::{MiningOptions, mine_generated};
-    use crate::traffic::trajectory::generator::GeneratorOptions;
+    use crate::study::plan::{StudyOptions, outline_study};
+    use lanesweep_model::profile::Profile;
+    use lanesweep_traffic::mining::{MiningOptions, mine_generated};
+    use lanesweep_traffic::trajectory::generator::GeneratorOptions;
 
     /// Counts the bytes read.
     struct Counted(Cursor<Vec<u8>>, usize);

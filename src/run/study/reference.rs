@@ -2,9 +2,9 @@
 //! to the threshold.
 
 use super::{StudyCases, WINDOW};
-use crate::Result;
-use crate::engine::{Backend, Chunk, CpuBackend, LanePlan, Outcome, Wanted, chunks};
-use crate::model::criterion::Criterion;
+use lanesweep_engine::{Backend, Chunk, CpuBackend, LanePlan, Outcome, Wanted, chunks};
+use lanesweep_model::criterion::Criterion;
+use lanesweep_support::Result;
 
 /// A verdict that differs between f32 and f64.
 #[derive(Debug, Clone, PartialEq)]

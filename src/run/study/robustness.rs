@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::engine::{Chunk, Constants, LaneKey, LanePlan, Outcome, Silent, Start};
+use lanesweep_engine::{Chunk, Constants, LaneKey, LanePlan, Outcome, Silent, Start};
 
 /// Whether moving the initial gap by 1e-9 m changes neither verdicts nor crash type of the f64 reference, for every lane of a
 /// chunk with outcomes. `None` for drivers outside the registry, which are slow lane by lane.

@@ -5,12 +5,12 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 use super::Study;
-use crate::engine::{Executor, Partial, SweepSummary, Wanted};
-use crate::run::parts::{Computed, EachChunk, Job, Ledger, PLAN_FILE, Shard, leave_plan};
-use crate::support::input_file;
-use crate::support::plain_text::sha256;
-use crate::support::run_folder::STUDY_RECORD;
-use crate::{Error, Place, Result};
+use crate::parts::{Computed, EachChunk, Job, Ledger, PLAN_FILE, Shard, leave_plan};
+use lanesweep_engine::{Executor, Partial, SweepSummary, Wanted};
+use lanesweep_support::input_file;
+use lanesweep_support::plain_text::sha256;
+use lanesweep_support::run_folder::STUDY_RECORD;
+use lanesweep_support::{Error, Place, Result};
 
 /// Result of a whole study.
 #[derive(Debug, Clone)]

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use serde::Serialize;
 use serde_json::ser::{Formatter, Serializer};
 
-use crate::{Error, Result};
+use lanesweep_support::{Error, Result};
 
 /// JSON with one line per field and per row, ending in a line end.
 ///

@@ -5,8 +5,8 @@ use super::bandwidth::{Bandwidth, BandwidthRule, LeaveOneOut};
 use super::mixture::Mixture;
 use super::moments::scale_of;
 use super::normal::Draws;
-use crate::random::Stream;
-use crate::{Error, Place, Result};
+use lanesweep_random::Stream;
+use lanesweep_support::{Error, Place, Result};
 
 /// f̂(x) = 1/N Σ_i Π_j φ((x_j − x_ij)/(h s_j))/(h s_j).
 #[derive(Debug, Clone, PartialEq)]

@@ -5,8 +5,8 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 
 use super::normal::{normal, uniform};
-use crate::random::Stream;
-use crate::{Error, Place, Result};
+use lanesweep_random::Stream;
+use lanesweep_support::{Error, Place, Result};
 
 /// Maximum number of blocks of four words per attempt at a draw.
 const BLOCKS_PER_ATTEMPT: u32 = 8;

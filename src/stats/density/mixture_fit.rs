@@ -7,8 +7,8 @@ use rayon::prelude::*;
 use super::Mixture;
 use super::moments::{factor_or_diagonal, moments};
 use super::normal::uniform;
-use crate::random::Stream;
-use crate::{Error, Place, Result};
+use lanesweep_random::Stream;
+use lanesweep_support::{Error, Place, Result};
 
 /// Purpose of the random words that select the initial centres.
 const PURPOSE: u32 = 0x464D_0001;

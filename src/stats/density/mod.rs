@@ -3,7 +3,7 @@
 //! This module contains the parameter spaces of scenarios, kernel density estimation, and Gaussian mixtures with their
 //! fit, which represent every density and proposal. It also contains the physically valid fraction of a density,
 //! exposure, and the density file. It contains nothing about lanes. Scenarios come from mining or a scenario file; points
-//! become cases through [`crate::scenario::parameterization`].
+//! become cases through [`lanesweep_model::scenario::parameterization`].
 
 mod bandwidth;
 mod json_rows;

@@ -13,10 +13,12 @@ use super::bandwidth::BandwidthRule;
 use super::kde::Kde;
 use super::parameters::ParameterSpace;
 use super::valid::{VALID_FRACTION_DRAWS, ValidFraction};
-use crate::scenario::parameterization::{Parameterization, ParameterizationOptions, Reduction, Sizes, SvdFit};
-use crate::scenario::{Category, Scenario};
-use crate::scenario::{DataProvenance, Driven};
-use crate::{Error, Place, Result};
+use lanesweep_model::scenario::parameterization::{
+    Parameterization, ParameterizationOptions, Reduction, Sizes, SvdFit,
+};
+use lanesweep_model::scenario::{Category, Scenario};
+use lanesweep_model::scenario::{DataProvenance, Driven};
+use lanesweep_support::{Error, Place, Result};
 
 /// Provenance of a density.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -16,14 +16,14 @@ use super::kde::Kde;
 use super::model::{DensityModel, EarlierFigures, Exposure, Provenance};
 use super::parameters::ParameterSpace;
 use super::valid::ValidFraction;
-use crate::scenario::parameterization::{
+use lanesweep_model::scenario::parameterization::{
     Parameter, Parameterization, ParameterizationOptions, Reduction, Sizes, SvdBasis,
 };
-use crate::scenario::{Category, Scenario, problem_of};
-use crate::support::atomic_file::AtomicFile;
-use crate::support::input_file;
-use crate::support::plain_text::hex;
-use crate::{Error, Place, Result};
+use lanesweep_model::scenario::{Category, Scenario, problem_of};
+use lanesweep_support::atomic_file::AtomicFile;
+use lanesweep_support::input_file;
+use lanesweep_support::plain_text::hex;
+use lanesweep_support::{Error, Place, Result};
 
 /// Version of the file format that this program writes and reads.
 const VERSION: u64 = 2;

@@ -1,6 +1,6 @@
 //! The standard normal distribution in f64, through `libm` only, so that draws have the same bits on every machine.
 
-use crate::random::Stream;
+use lanesweep_random::Stream;
 
 /// Cumulative probability at `x`, accurate also far in the tails.
 pub fn normal_cdf(x: f64) -> f64 {

@@ -19,13 +19,13 @@
 //! The filters of mining (a slower cutter, a hard deceleration) are not part of the valid region: kernels extend beyond
 //! them.
 
-use crate::scenario::parameterization::{
+use lanesweep_model::scenario::parameterization::{
     Family, LateralStart, MAX_DURATION_S, MIN_DURATION_S, Parameter, Parameterization, ParameterizationOptions,
     ReducedScenario, ReducedSeries, Reduction, Sizes, Variable,
 };
-use crate::scenario::{Case, Category, Scenario};
-use crate::support::plain_text::nearest;
-use crate::{Error, Place, Result};
+use lanesweep_model::scenario::{Case, Category, Scenario};
+use lanesweep_support::plain_text::nearest;
+use lanesweep_support::{Error, Place, Result};
 
 /// Ordered parameters of one parameterization.
 #[derive(Debug, Clone, PartialEq)]

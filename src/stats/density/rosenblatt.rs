@@ -114,7 +114,7 @@ mod tests {
         let factor = DMatrix::from_row_slice(2, 2, &[0.5, 0.0, 0.3, 0.2]);
         let means = vec![vec![0.0, 0.0], vec![2.0, 3.0], vec![4.0, -1.0]];
         let mixture = Mixture::new(vec![0.5, 0.3, 0.2], means.clone(), vec![factor.clone()], vec![0; 3]).unwrap();
-        let stream = crate::random::Stream { seed: 3, purpose: 1 };
+        let stream = lanesweep_random::Stream { seed: 3, purpose: 1 };
         let n = 20_000;
         let normals = |index| {
             let mut draws = super::super::Draws::new(stream, index);

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use super::kde::Kde;
 use super::normal::normal_quantile;
 use super::parameters::{Invalid, ParameterSpace};
-use crate::random::Stream;
-use crate::{Error, Place, Result};
+use lanesweep_random::Stream;
+use lanesweep_support::{Error, Place, Result};
 
 /// [`Stream::purpose`] of these draws.
 const VALID_FRACTION_PURPOSE: u32 = 0x7661_6c64;

@@ -11,7 +11,7 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result};
 
 /// Indices in a block. Ranges that start and end at multiples of it join fastest.
 pub(crate) const BLOCK: u64 = 4096;

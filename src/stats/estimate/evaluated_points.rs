@@ -5,9 +5,9 @@
 use rayon::prelude::*;
 
 use super::limit_state::{BATCH, Density, LimitState, evaluate_checked};
-use crate::Result;
-use crate::random::Stream;
-use crate::stats::density::Mixture;
+use crate::density::Mixture;
+use lanesweep_random::Stream;
+use lanesweep_support::Result;
 
 /// A proposal that points were drawn from.
 pub(super) struct Source {

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::importance::Importance;
 use super::search::Found;
-use crate::stats::density::normal_quantile;
+use crate::density::normal_quantile;
 
 /// Factor on the number of draws that a search predicts, because it knows the variance only roughly.
 const RESERVE: f64 = 1.2;

@@ -16,9 +16,9 @@ use super::stop::StopReason;
 use super::summary::Estimate;
 use super::warnings::Warning;
 use super::weights::WeightSums;
-use crate::Result;
-use crate::random::Stream;
-use crate::stats::density::Mixture;
+use crate::density::Mixture;
+use lanesweep_random::Stream;
+use lanesweep_support::Result;
 
 /// Draws of a proposal and of the density, as one sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

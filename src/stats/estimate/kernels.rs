@@ -8,8 +8,8 @@ use super::interval::log_normal;
 use super::limit_state::{Density, LimitState, purpose};
 use super::summary::Estimate;
 use super::warnings::Warning;
-use crate::Result;
-use crate::stats::density::Mixture;
+use crate::density::Mixture;
+use lanesweep_support::Result;
 
 /// Number of draws of the proposal for counting the fractions.
 const DRAWS: u64 = 4096;

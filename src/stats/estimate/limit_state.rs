@@ -6,9 +6,9 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::random::Stream;
-use crate::stats::density::Mixture;
-use crate::{Error, Place, Result};
+use crate::density::Mixture;
+use lanesweep_random::Stream;
+use lanesweep_support::{Error, Place, Result};
 
 /// Maximum number of attempts at a valid point; after these the index is void. With a valid fraction of one half, one
 /// index in 2⁶⁴ is void; with 5 %, one in 27.

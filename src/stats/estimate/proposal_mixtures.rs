@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 
 use super::evaluated_points::Pool;
-use crate::Result;
-use crate::stats::density::Mixture;
+use crate::density::Mixture;
+use lanesweep_support::Result;
 
 /// A fit is widened: most of its weight in copies with this much more variance …
 const NARROW: (f64, f64) = (0.75, 1.2);

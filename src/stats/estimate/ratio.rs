@@ -209,7 +209,7 @@ pub fn paired_ratio(numerator: Clusters, denominator: Clusters, level: f64) -> R
 mod tests {
     use super::super::{StopReason, from_clusters};
     use super::*;
-    use crate::random::Stream;
+    use lanesweep_random::Stream;
 
     #[test]
     fn clusters_of_equal_size_have_the_interval_of_equal_clusters() {

@@ -14,10 +14,10 @@ use serde::{Deserialize, Serialize};
 use super::evaluated_points::{Pool, effective_size};
 use super::limit_state::{Density, LimitState, purpose};
 use super::proposal_mixtures::{designs, fitted};
-use crate::random::Stream;
-use crate::stats::density::Mixture;
-use crate::stats::density::moments::{factor_or_diagonal, moments};
-use crate::{Error, Place, Result};
+use crate::density::Mixture;
+use crate::density::moments::{factor_or_diagonal, moments};
+use lanesweep_random::Stream;
+use lanesweep_support::{Error, Place, Result};
 
 /// Variances of the wider copies of the density in the first round, relative to its own.
 const WIDER: [f64; 2] = [4.0, 9.0];
@@ -172,7 +172,7 @@ impl Question {
 /// Searches a proposal under which every question that can fail is estimated well.
 ///
 /// # Errors
-/// Those of the limit state; [`crate::Error::Usage`] if the density has no valid point.
+/// Those of the limit state; [`lanesweep_support::Error::Usage`] if the density has no valid point.
 pub fn search(nominal: &dyn Density, limit_state: &dyn LimitState, options: &Search, seed: u64) -> Result<SearchRun> {
     let mut searching = Searching::start(nominal, limit_state, options, seed)?;
     let mut rounds = Vec::new();

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::support::readable::significant;
+use lanesweep_support::readable::significant;
 
 /// One warning, with the figure that causes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -7,7 +7,7 @@ use serde_json::{Map, Value};
 use super::writer::{append_csv, csv_header};
 use super::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter, writer};
 use crate::Result;
-use crate::support::readable;
+use crate::readable;
 
 /// Columns and rows; every row has one cell per column.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -172,7 +172,7 @@ fn shown(column: &Column, cell: &Cell) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::support::table::Digits;
+    use crate::table::Digits;
 
     type Row = (&'static str, Option<f64>, u64, &'static str);
 

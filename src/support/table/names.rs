@@ -1,6 +1,6 @@
 //! Maps a column of a user's table to a field by its name, with or without the unit at the end.
 
-use crate::support::plain_text;
+use crate::plain_text;
 
 /// A field that a table can have.
 #[derive(Debug, Clone)]

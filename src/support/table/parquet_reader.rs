@@ -22,7 +22,7 @@ use parquet::basic::Compression;
 use serde_json::Value;
 
 use super::{Cell as TableCell, Row, TableRows};
-use crate::support::input_file;
+use crate::input_file;
 use crate::{Error, Place, Result};
 
 /// Rows decoded together, with and without lists; each may repeat a text of [`MAX_TEXT`].

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 use super::arrow::ArrowRows;
 use super::{Cell, Column, ColumnKind, TableMetadata};
-use crate::support::atomic_file::AtomicFile;
+use crate::atomic_file::AtomicFile;
 use crate::{Error, Result};
 
 /// Number of rows encoded together.

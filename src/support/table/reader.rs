@@ -6,7 +6,7 @@ use super::csv_reader::CsvRows;
 #[cfg(feature = "parquet")]
 use super::parquet_reader::ParquetRows;
 use super::{TableFormat, TableRows};
-use crate::support::plain_text::cut_names;
+use crate::plain_text::cut_names;
 use crate::{Error, Place, Result};
 
 /// A table being read.

@@ -14,7 +14,7 @@ use serde_json::Value;
 #[cfg(feature = "parquet")]
 use super::parquet_writer::ParquetFile;
 use super::{Cell, Column, ColumnKind, TableFormat, TableMetadata};
-use crate::support::atomic_file::{AtomicFile, StagedFile};
+use crate::atomic_file::{AtomicFile, StagedFile};
 use crate::{Error, Result};
 
 /// A table being written. Memory does not grow with the number of rows. Dropping it before [`TableWriter::finish`]

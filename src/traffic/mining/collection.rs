@@ -13,12 +13,12 @@ use super::miner::{CategoryCount, Mined, mine};
 use super::noise::noise_notes;
 use super::options::MiningOptions;
 use super::{cut_in, cut_out, lvd};
-use crate::scenario::{Category, Scenario, ScenarioFile, mined_id, usable};
-use crate::support::plausibility::Implausible;
-use crate::support::readable;
-use crate::traffic::trajectory::generator::{GeneratorOptions, generate_one};
-use crate::traffic::trajectory::{FileChecksum, InputFile, Inputs, Loaded, Recording};
-use crate::{Error, Place, Result};
+use crate::trajectory::generator::{GeneratorOptions, generate_one};
+use crate::trajectory::{FileChecksum, InputFile, Inputs, Loaded, Recording};
+use lanesweep_model::scenario::{Category, Scenario, ScenarioFile, mined_id, usable};
+use lanesweep_support::plausibility::Implausible;
+use lanesweep_support::readable;
+use lanesweep_support::{Error, Place, Result};
 
 /// Results of one recording.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -116,11 +116,7 @@ pub fn counts_text(counts: &[CategoryCount]) -> String {
 }
 
 /// Applies the filters of mining to scenarios of a file or table, which are kept as given; or says what they would keep.
-pub(in crate::traffic) fn filter_given(
-    scenarios: &mut [Scenario],
-    options: &MiningOptions,
-    applies: bool,
-) -> Option<String> {
+pub(crate) fn filter_given(scenarios: &mut [Scenario], options: &MiningOptions, applies: bool) -> Option<String> {
     let verdict = |of: &Scenario| match of.category {
         Category::CutIn => cut_in::verdict(of, &options.cut_in),
         Category::CutOut => cut_out::verdict(of, &options.cut_out),

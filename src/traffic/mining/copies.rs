@@ -1,7 +1,7 @@
 //! Scenarios that stand twice in the data: a copy of a file, a simulation without a seed, a table that was joined twice. Each copy
 //! would narrow every interval, and a density that is fitted to them.
 
-use crate::scenario::{Other, Scenario};
+use lanesweep_model::scenario::{Other, Scenario};
 
 /// Scenarios whose numbers differ by less are near copies: m, m/s, s.
 const NEAR: f64 = 0.06;
@@ -21,7 +21,7 @@ fn numbers(of: &Scenario) -> impl Iterator<Item = f64> {
 }
 
 /// Leaves out scenarios that are equal to an earlier one but for their names. Returns sentences about them, and about near copies.
-pub(in crate::traffic) fn leave_out_copies(scenarios: &mut Vec<Scenario>) -> Vec<String> {
+pub(crate) fn leave_out_copies(scenarios: &mut Vec<Scenario>) -> Vec<String> {
     // Numbers that are close have close sums.
     let start = |of: &Scenario| [of.ego.v0, of.start_gap_m().unwrap_or(0.0), of.target.v[0]];
     let sum = |[ego, gap, target]: [f64; 3]| ego + 1.732_050_8 * gap + 2.236_068 * target;

@@ -12,7 +12,7 @@ use super::data_set::{DataSet, FoundScenario, Stretch};
 use super::lateral::LaneChangeKind;
 use super::options::{CutInOptions, TOLERANCE};
 use super::tags::{Item, Match, Tags};
-use crate::scenario::{Category, Scenario, Side};
+use lanesweep_model::scenario::{Category, Scenario, Side};
 
 /// The items, in order.
 pub const ITEMS: [Item<'static, Tags>; 2] =

@@ -13,8 +13,8 @@ use super::cut_in::with_lane_change;
 use super::data_set::{DataSet, FoundScenario, Stretch, gap_m, micrometres};
 use super::options::{CutOutOptions, TOLERANCE};
 use super::tags::{Item, Match, Tags};
-use crate::scenario::{Category, Scenario};
-use crate::traffic::trajectory::Track;
+use crate::trajectory::Track;
+use lanesweep_model::scenario::{Category, Scenario};
 
 /// The items, in order.
 pub(super) const ITEMS: [Item<'static, Tags>; 2] =

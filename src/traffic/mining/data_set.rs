@@ -1,12 +1,12 @@
 //! The ego-centric data set: one ego, the part of its track in the data set, the vehicles in range, and the leader.
-//! Its extent is that of [`EgoViewOptions`](crate::traffic::trajectory::EgoViewOptions).
+//! Its extent is that of [`EgoViewOptions`](crate::trajectory::EgoViewOptions).
 //!
 //! [`FoundScenario`] is what all categories take from the tracks of a match.
 
 use super::options::{MiningOptions, TOLERANCE};
 use super::tags::{Activities, Tags};
-use crate::scenario::{Category, Ego, Other, Scenario, Side, mined_id};
-use crate::traffic::trajectory::{Carriageway, FrameIndex, Lane, NO_LANE, Recording, Track};
+use crate::trajectory::{Carriageway, FrameIndex, Lane, NO_LANE, Recording, Track};
+use lanesweep_model::scenario::{Category, Ego, Other, Scenario, Side, mined_id};
 
 /// A recording with its activities and neighbours, which are computed once.
 pub(super) struct RecordingTags<'a> {

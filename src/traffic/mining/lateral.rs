@@ -5,7 +5,7 @@
 
 use super::longitudinal::trailing_min;
 use super::options::{LaneChangeEnd, LateralOptions, TOLERANCE, samples, window_samples};
-use crate::traffic::trajectory::Lane;
+use crate::trajectory::Lane;
 
 /// The four lane changes relative to one lane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

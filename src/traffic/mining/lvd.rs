@@ -7,7 +7,7 @@
 use super::data_set::{DataSet, FoundScenario};
 use super::options::{LvdOptions, TOLERANCE};
 use super::tags::{Item, Match, Tags};
-use crate::scenario::{Category, Scenario, Side};
+use lanesweep_model::scenario::{Category, Scenario, Side};
 
 /// The items, in order.
 pub const ITEMS: [Item<'static, Tags>; 1] = [&|t: &Tags| t.has(Tags::LEADER | Tags::DECELERATES)];

@@ -4,8 +4,8 @@ use super::data_set::{DataSet, RecordingTags, Stretch};
 use super::options::{MiningOptions, TOLERANCE, samples};
 use super::tags::{Item, Match, Tags};
 use super::{cut_in, cut_out, lvd, tags};
-use crate::scenario::Scenario;
-use crate::traffic::trajectory::Recording;
+use crate::trajectory::Recording;
+use lanesweep_model::scenario::Scenario;
 
 /// Scenarios of a recording.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -4,8 +4,8 @@
 //! with the search for sequences of items ([`tags`]). Each category has a file with its items, its trimming and the
 //! filters of the paper ([`cut_in`], `cut_out`, [`lvd`]). [`MiningOptions`] has every threshold; [`mine`] runs over a
 //! recording. Mining depends neither on file formats nor on the use of scenarios. Data comes from
-//! [`crate::traffic::trajectory`] and goes, as [`Scenario`](crate::scenario::Scenario)s, to
-//! [`crate::scenario::parameterization`].
+//! [`crate::trajectory`] and goes, as [`Scenario`](lanesweep_model::scenario::Scenario)s, to
+//! [`lanesweep_model::scenario::parameterization`].
 //!
 //! A new category is one file beside [`lvd`] and its search in `miner.rs`.
 //!

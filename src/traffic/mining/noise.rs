@@ -1,8 +1,8 @@
 //! Whether noise decides what is found and kept: the noise of a recording beside the thresholds of mining.
 
 use super::options::MiningOptions;
-use crate::support::readable::{significant, value};
-use crate::traffic::trajectory::{Noise, Recording};
+use crate::trajectory::{Noise, Recording};
+use lanesweep_support::readable::{significant, value};
 
 /// Noise of accelerations above this fraction of the threshold of the peak can decide. Drivers who dawdle, as those of SUMO, make 0.22.
 const MAX_FRACTION: f64 = 0.3;

@@ -4,9 +4,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::support::ranges;
-use crate::traffic::trajectory::{EgoViewOptions, LIMIT_TOLERANCE_M};
-use crate::{Result, settings};
+use crate::trajectory::{EgoViewOptions, LIMIT_TOLERANCE_M};
+use lanesweep_support::ranges;
+use lanesweep_support::{Result, settings};
 
 settings! {
     /// All options of `mine`. Values above 10⁶ have no meaning in traffic, and their number of samples
@@ -140,7 +140,7 @@ impl MiningOptions {
     /// Refuses values for which the definitions have no meaning.
     ///
     /// # Errors
-    /// [`Error::Usage`](crate::Error::Usage) naming the option: not finite, negative, above 10⁶, or zero where a duration or distance is
+    /// [`Error::Usage`](lanesweep_support::Error::Usage) naming the option: not finite, negative, above 10⁶, or zero where a duration or distance is
     /// needed.
     pub fn validate(&self) -> Result<()> {
         ranges::check("mining", self)

@@ -8,7 +8,7 @@
 use super::lateral::{LaneChange, lane_changes};
 use super::longitudinal::{Longitudinal, LongitudinalEvent, longitudinal_events};
 use super::options::{MiningOptions, TOLERANCE};
-use crate::traffic::trajectory::{Carriageway, Track};
+use crate::trajectory::{Carriageway, Track};
 
 /// Tags of one ego and one target at one sample, as a set of bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

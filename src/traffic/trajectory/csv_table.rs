@@ -4,8 +4,8 @@
 //! Accepted, because they change no value: Windows line ends, a byte order mark, blank lines, quotes, blanks around a
 //! field, columns in another order, additional columns, UTF-16, compression by gzip.
 
-use crate::support::files::file_name;
-use crate::support::plain_text::hex;
+use lanesweep_support::files::file_name;
+use lanesweep_support::plain_text::hex;
 use std::io::{self, Cursor, Read};
 use std::path::{Path, PathBuf};
 
@@ -13,10 +13,10 @@ use csv::{ByteRecord, Reader, ReaderBuilder, Terminator};
 use sha2::{Digest, Sha256};
 
 use super::number;
-use crate::support::input_file;
-use crate::support::plain_text::nearest;
-use crate::support::table::{delimiter_of, has_decimal_commas};
-use crate::{Error, Place, Result};
+use lanesweep_support::input_file;
+use lanesweep_support::plain_text::nearest;
+use lanesweep_support::table::{delimiter_of, has_decimal_commas};
+use lanesweep_support::{Error, Place, Result};
 
 /// Identity of a file's content in the run record.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]

@@ -95,7 +95,7 @@ impl FrameIndex {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::traffic::trajectory::recording::{Carriageway, Track, VehicleClass};
+    use crate::trajectory::recording::{Carriageway, Track, VehicleClass};
 
     fn track(id: u32, first_frame: i64, s_m: Vec<f64>) -> Track {
         let n = s_m.len();

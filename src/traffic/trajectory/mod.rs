@@ -2,7 +2,7 @@
 //!
 //! Here live the recording model, the reader and writer of highD's format, the reader of all other formats (presets), the
 //! ego-centric view and the generator of synthetic recordings. Here lives nothing about
-//! scenarios. Data comes from files or from the generator and goes to [`crate::traffic::mining`].
+//! scenarios. Data comes from files or from the generator and goes to [`crate::mining`].
 
 mod csv_table;
 mod frame_index;

@@ -3,8 +3,8 @@
 
 use super::noise::Noise;
 use super::recording::{Recording, Track};
-use crate::support::plausibility::{Doubts, Quantity};
-use crate::support::readable::{significant, value};
+use lanesweep_support::plausibility::{Doubts, Quantity};
+use lanesweep_support::readable::{significant, value};
 
 /// A speed that differs so much from what the positions around it tell contradicts them, m/s.
 const MAX_DIFFERENCE_MPS: f64 = 5.0;

@@ -9,7 +9,7 @@
 use std::collections::BTreeMap;
 
 use super::csv_table::FileChecksum;
-use crate::settings;
+use lanesweep_support::settings;
 
 /// One recording: a stretch of road over a period of time.
 #[derive(Debug, Clone, PartialEq)]
@@ -198,7 +198,7 @@ impl EgoViewOptions {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::traffic::trajectory::VehicleClass;
+    use crate::trajectory::VehicleClass;
 
     /// A vehicle at 20 m/s, 10 samples per second.
     fn track(from_m: f64, samples: usize) -> Track {

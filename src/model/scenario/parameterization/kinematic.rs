@@ -4,8 +4,8 @@ use super::options::{AfterDuration, LateralStart, ParameterizationOptions};
 use super::parameter::Variable;
 use super::series::{TimeGrid, accelerated, at, steps_of};
 use super::sizes::Sizes;
-use crate::Result;
 use crate::scenario::{Case, Category, Lateral, Scenario, Speed};
+use lanesweep_support::Result;
 
 /// How the speeds of the vehicles other than the ego change over [0, T].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

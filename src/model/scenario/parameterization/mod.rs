@@ -26,7 +26,7 @@ pub use sizes::{Sizes, VehicleSize};
 pub use svd::{SvdBasis, fit_svd};
 
 use crate::scenario::{Case, Category, Scenario};
-use crate::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result};
 
 /// How a parameterization represents a scenario.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -3,8 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::support::ranges;
-use crate::{Result, settings};
+use lanesweep_support::ranges;
+use lanesweep_support::{Result, settings};
 
 /// What a constant acceleration does after the scenario's duration T.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

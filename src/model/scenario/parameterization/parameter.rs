@@ -7,8 +7,8 @@ use super::options::ParameterizationOptions;
 use super::series::{lateral_speed, mean_acceleration};
 use super::sizes::vehicle_ahead;
 use crate::scenario::{Category, Scenario};
-use crate::support::plausibility::Quantity;
-use crate::{Error, Place, Result};
+use lanesweep_support::plausibility::Quantity;
+use lanesweep_support::{Error, Place, Result};
 
 /// Minimum duration T of a valid point and of a reconstruction, s.
 pub const MIN_DURATION_S: f64 = 0.1;

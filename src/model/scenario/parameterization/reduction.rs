@@ -10,7 +10,7 @@ use super::series::{SeriesCase, TimeGrid, at};
 use super::sizes::{Sizes, vehicle_ahead};
 use super::svd::{SvdBasis, fit_svd};
 use crate::scenario::{Case, Category, Scenario, Side};
-use crate::{Error, Result};
+use lanesweep_support::{Error, Result};
 
 /// Number of directions whose mode shapes are shown.
 const SHOWN: usize = 3;
@@ -89,7 +89,8 @@ impl Reduction {
     pub fn from_parts(category: Category, basis: SvdBasis, options: &ParameterizationOptions) -> Result<Reduction> {
         let (series, extras) = layout(category);
         let p = series.len() * options.svd_instants + extras.len();
-        let wrong = |problem: String| Err(Error::input(crate::Place::item("basis"), problem, "fit it again"));
+        let wrong =
+            |problem: String| Err(Error::input(lanesweep_support::Place::item("basis"), problem, "fit it again"));
         let lengths = [basis.weights.len(), basis.mean.len()].into_iter().chain(basis.directions.iter().map(Vec::len));
         if let Some(other) = lengths.into_iter().find(|&length| length != p) {
             return wrong(format!("a row of {other} numbers, where {} has {p}", category.label()));
@@ -278,7 +279,7 @@ fn vector(scenario: &Scenario, options: &ParameterizationOptions) -> Result<Vec<
     let n = options.svd_instants;
     if n < 2 {
         return Err(Error::usage(
-            crate::Place::item("svd_instants"),
+            lanesweep_support::Place::item("svd_instants"),
             format!("{n} instants cannot describe a series"),
             "use 50, as published",
         ));

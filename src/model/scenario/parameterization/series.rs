@@ -3,9 +3,9 @@
 
 use super::options::{AfterDuration, LateralSpeed, ParameterizationOptions};
 use super::sizes::{Sizes, vehicle_ahead};
-use crate::Result;
-use crate::model::profile::Profile;
+use crate::profile::Profile;
 use crate::scenario::{Case, Category, Lateral, Other, Scenario, Speed};
+use lanesweep_support::Result;
 
 /// Value of a series of rate `fps`, Hz, at time `t_s`, s: linear between samples; the last sample is held.
 pub(super) fn at(series: &[f64], fps: f64, t_s: f64) -> f64 {
@@ -93,7 +93,7 @@ impl SeriesCase<'_> {
     /// The case on a time grid.
     ///
     /// # Errors
-    /// [`Error::Input`](crate::Error::Input) for a cut-out without the size of the vehicle ahead.
+    /// [`Error::Input`](lanesweep_support::Error::Input) for a cut-out without the size of the vehicle ahead.
     pub(super) fn on(&self, grid: TimeGrid, sizes: &Sizes) -> Result<Case> {
         let SeriesCase { category, fps, duration_s, .. } = *self;
         let speed = |series: &[f64]| speed_on_grid(series, fps, duration_s, grid);

@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::scenario::{Ahead, Case, Category, LANE_WIDTH_M, Lateral, Other, Participant, Scenario, Speed};
-use crate::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result};
 
 /// Length and width of one vehicle, m, > 0.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

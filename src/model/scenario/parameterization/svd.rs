@@ -7,8 +7,8 @@
 use faer::Mat;
 
 use super::options::{SeriesScale, SvdLateral};
-use crate::support::vector_state::clear_upper_halves;
-use crate::{Error, Place, Result};
+use lanesweep_support::vector_state::clear_upper_halves;
+use lanesweep_support::{Error, Place, Result};
 
 /// A fitted decomposition.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -144,7 +144,7 @@ impl SvdBasis {
 #[cfg(all(test, target_arch = "x86_64"))]
 mod tests {
     use super::*;
-    use crate::support::vector_state::upper_halves_in_use;
+    use lanesweep_support::vector_state::upper_halves_in_use;
 
     /// A fit does not slow down the code that runs after it.
     #[test]

@@ -9,7 +9,7 @@ use super::lane_change::{Manner, Way, acceptance, motive};
 use super::lateral::LaneChangeMotion;
 use super::traffic::{Traffic, centre_of};
 use super::vehicle::draw_line;
-use crate::traffic::trajectory::VehicleClass;
+use crate::trajectory::VehicleClass;
 
 /// Distance before the view at which the raised rates begin, so that changes are in progress at its edge.
 const RAISED_BEFORE_M: f64 = 120.0;

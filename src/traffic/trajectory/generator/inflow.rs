@@ -4,7 +4,7 @@ use super::options::GeneratorOptions;
 use super::random::TrafficRandom;
 use super::traffic::centre_of;
 use super::vehicle::{Vehicle, draw_line};
-use crate::traffic::trajectory::VehicleClass;
+use crate::trajectory::VehicleClass;
 
 /// Fraction of arrivals that follow the previous vehicle at their desired headway, at the published flow or more; the
 /// others arrive freely.

@@ -2,7 +2,7 @@
 
 use super::options::Behaviour;
 use super::random::TrafficRandom;
-use crate::traffic::trajectory::VehicleClass;
+use crate::trajectory::VehicleClass;
 
 /// Published range of lane-change durations, s.
 const DURATION_S: [f64; 2] = [2.9, 7.3];

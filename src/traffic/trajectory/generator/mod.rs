@@ -66,8 +66,8 @@ pub use options::{Behaviour, GeneratorOptions};
 
 use rayon::prelude::*;
 
-use crate::support::error::{Error, Place, Result};
-use crate::traffic::trajectory::Recording;
+use crate::trajectory::Recording;
+use lanesweep_support::error::{Error, Place, Result};
 
 /// All recordings of these options, in order. The result does not depend on the number of threads.
 pub fn generate(options: &GeneratorOptions) -> Result<Vec<Recording>> {

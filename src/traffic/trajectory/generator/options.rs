@@ -4,8 +4,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::support::ranges;
-use crate::{Result, settings};
+use lanesweep_support::ranges;
+use lanesweep_support::{Result, settings};
 
 settings! {
     /// Options of the generator. `lanesweep study` without data uses the default.

@@ -6,8 +6,8 @@ use super::options::GeneratorOptions;
 use super::random::{Purpose, TrafficRandom};
 use super::traffic::Traffic;
 use super::vehicle::Vehicle;
-use crate::support::error::Result;
-use crate::traffic::trajectory::{Carriageway, NO_LANE, Recording, Track, highd};
+use crate::trajectory::{Carriageway, NO_LANE, Recording, Track, highd};
+use lanesweep_support::error::Result;
 
 /// Upper edge of the image to the first line, and between the carriageways, m.
 const VERGE_M: f64 = 8.0;

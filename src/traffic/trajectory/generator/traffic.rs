@@ -9,7 +9,7 @@ use super::lane_change::{LaneView, Neighbour};
 use super::options::GeneratorOptions;
 use super::random::{Purpose, TrafficRandom};
 use super::vehicle::Vehicle;
-use crate::traffic::trajectory::VehicleClass;
+use crate::trajectory::VehicleClass;
 
 /// Road before the camera's view, m. Followers need this distance to settle behind their leaders. On a longer road,
 /// vehicles would be sorted by speed before they enter the view.

@@ -4,7 +4,7 @@ use super::braking::Braking;
 use super::idm::DriverParameters;
 use super::lateral::{LaneChangeMotion, Wander};
 use super::random::TrafficRandom;
-use crate::traffic::trajectory::VehicleClass;
+use crate::trajectory::VehicleClass;
 
 /// Standard deviation of the drivers' lateral positions in their lane, m.
 const LINE_SD_M: f64 = 0.18;

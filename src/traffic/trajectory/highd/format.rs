@@ -1,6 +1,6 @@
 //! Headers of the three highD files, with the columns in the order of the format.
 
-use crate::traffic::trajectory::csv_table::CsvFormat;
+use crate::trajectory::csv_table::CsvFormat;
 
 /// `NN_tracks.csv`: one line per vehicle and frame.
 pub(super) const TRACKS_HEADER: &str = "frame,id,x,y,width,height,xVelocity,yVelocity,xAcceleration,yAcceleration,\

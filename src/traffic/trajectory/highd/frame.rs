@@ -1,7 +1,7 @@
 //! Transformations between highD's image (corner of the box, y down, `laneId` ascending with y) and the internal frame
 //! (centre, forward and left, lane 0 leftmost). The reader and the writer use them.
 
-use crate::traffic::trajectory::NO_LANE;
+use crate::trajectory::NO_LANE;
 
 /// Half of the image in which a vehicle drives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::support::input_file;
-use crate::traffic::trajectory::inputs::files_of;
-use crate::traffic::trajectory::tracks::may_hold_tracks;
-use crate::{Error, Place, Result};
+use crate::trajectory::inputs::files_of;
+use crate::trajectory::tracks::may_hold_tracks;
+use lanesweep_support::input_file;
+use lanesweep_support::{Error, Place, Result};
 
 /// The three files of one recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -30,7 +30,7 @@ impl HighdFiles {
     }
 
     /// The same; files that only gzip's ending tells from these names take their places.
-    pub(in crate::traffic::trajectory) fn found(dir: &Path, id: &str) -> Self {
+    pub(in crate::trajectory) fn found(dir: &Path, id: &str) -> Self {
         let HighdFiles { id, tracks, tracks_meta, recording_meta } = HighdFiles::named(dir, id);
         let [tracks, tracks_meta, recording_meta] =
             [tracks, tracks_meta, recording_meta].map(input_file::packed_or_not);
@@ -40,7 +40,7 @@ impl HighdFiles {
 
 impl HighdFiles {
     /// Whether all three are there.
-    pub(in crate::traffic::trajectory) fn is_complete(&self) -> bool {
+    pub(in crate::trajectory) fn is_complete(&self) -> bool {
         self.tracks.exists() && self.tracks_meta.exists() && self.recording_meta.exists()
     }
 }
@@ -55,7 +55,7 @@ pub struct Inventory {
 }
 
 /// File names after the prefix, in the order of the fields of [`HighdFiles`].
-pub(in crate::traffic::trajectory) const SUFFIXES: [&str; 3] = ["_tracks.csv", "_tracksMeta.csv", "_recordingMeta.csv"];
+pub(in crate::trajectory) const SUFFIXES: [&str; 3] = ["_tracks.csv", "_tracksMeta.csv", "_recordingMeta.csv"];
 
 /// Finds the recordings of a folder (not of its subfolders).
 ///
@@ -63,7 +63,7 @@ pub(in crate::traffic::trajectory) const SUFFIXES: [&str; 3] = ["_tracks.csv", "
 /// If it is not a folder, cannot be listed, or holds no complete recording.
 pub fn inventory(dir: &Path) -> Result<Inventory> {
     let found = prefixes(dir)?;
-    let unfinished = crate::support::run_folder::unfinished(dir).unwrap_or_default();
+    let unfinished = lanesweep_support::run_folder::unfinished(dir).unwrap_or_default();
     if unfinished.iter().any(|name| name.ends_with(SUFFIXES[0])) {
         let problem = "`tracks` did not finish writing here, so recordings are missing";
         let help = "repeat that command, which completes the folder, or remove the folder";

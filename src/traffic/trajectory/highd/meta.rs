@@ -4,11 +4,11 @@
 use super::format::{FRAME_RATES_HZ, LANE_LINES_LIMIT, RECORDING_META_HEADER, TRACKS_META_HEADER, csv_format};
 use super::frame::{Direction, LaneNumbers};
 use super::inventory::HighdFiles;
-use crate::support::plausibility::{Doubts, HELP, Quantity};
-use crate::traffic::trajectory::csv_table::{CsvColumn, CsvTable, FileChecksum, excerpt};
-use crate::traffic::trajectory::number;
-use crate::traffic::trajectory::{Carriageway, VehicleClass};
-use crate::{Error, Place, Result};
+use crate::trajectory::csv_table::{CsvColumn, CsvTable, FileChecksum, excerpt};
+use crate::trajectory::number;
+use crate::trajectory::{Carriageway, VehicleClass};
+use lanesweep_support::plausibility::{Doubts, HELP, Quantity};
+use lanesweep_support::{Error, Place, Result};
 
 /// Content of `recordingMeta`.
 pub(super) struct RecordingMeta {

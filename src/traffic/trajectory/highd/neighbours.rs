@@ -1,7 +1,7 @@
 //! Neighbours of each vehicle per frame, for highD's neighbour columns. Only the writer needs them.
 
-use crate::traffic::trajectory::frame_index::{FrameIndex, VehicleAtFrame};
-use crate::traffic::trajectory::{Recording, Track};
+use crate::trajectory::frame_index::{FrameIndex, VehicleAtFrame};
+use crate::trajectory::{Recording, Track};
 
 /// No vehicle.
 pub(super) const NOBODY: u32 = u32::MAX;
@@ -96,7 +96,7 @@ fn beside(tracks: &[Track], vehicles: &[VehicleAtFrame], here: VehicleAtFrame) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::traffic::trajectory::{Carriageway, NO_LANE, VehicleClass};
+    use crate::trajectory::{Carriageway, NO_LANE, VehicleClass};
 
     fn standing(id: u32, first_frame: i64, s_m: f64, lane: u16) -> Track {
         Track {

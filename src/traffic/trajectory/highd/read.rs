@@ -6,12 +6,12 @@ use std::path::Path;
 use super::format::{FRAME_LIMIT, TRACKS_HEADER, csv_format};
 use super::inventory::{HighdFiles, made_up};
 use super::meta::{self, RecordingMeta, VehicleMeta};
-use crate::support::atomic_file::folder_of;
-use crate::support::plausibility::{Doubts, HELP, Implausible, Quantity};
-use crate::traffic::trajectory::Loaded;
-use crate::traffic::trajectory::csv_table::{CsvColumn, CsvTable};
-use crate::traffic::trajectory::{NO_LANE, Recording, Track};
-use crate::{Error, Result};
+use crate::trajectory::Loaded;
+use crate::trajectory::csv_table::{CsvColumn, CsvTable};
+use crate::trajectory::{NO_LANE, Recording, Track};
+use lanesweep_support::atomic_file::folder_of;
+use lanesweep_support::plausibility::{Doubts, HELP, Implausible, Quantity};
+use lanesweep_support::{Error, Result};
 
 /// Like [`read_checked`], but accepts implausible values.
 ///

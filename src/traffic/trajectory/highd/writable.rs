@@ -2,9 +2,9 @@
 
 use super::format::{FRAME_LIMIT, FRAME_RATES_HZ, LANE_LINES_LIMIT};
 use super::frame::{Direction, LaneNumbers};
-use crate::traffic::trajectory::number::{REAL_LIMIT, rounded};
-use crate::traffic::trajectory::{NO_LANE, Recording, Track};
-use crate::{Error, Place, Result};
+use crate::trajectory::number::{REAL_LIMIT, rounded};
+use crate::trajectory::{NO_LANE, Recording, Track};
+use lanesweep_support::{Error, Place, Result};
 
 /// Rounds a recording to the values that its own files hold: writing the quantized recording with
 /// `write` and reading it gives the same bits.

@@ -9,10 +9,10 @@ use super::frame::Direction;
 use super::inventory::HighdFiles;
 use super::neighbours::{Around, NOBODY, neighbours};
 use super::writable::ImageLayout;
-use crate::support::atomic_file::{AtomicFile, StagedFile};
-use crate::traffic::trajectory::number::{push_hundredths, push_integer, rounded};
-use crate::traffic::trajectory::{Recording, Track, VehicleClass};
-use crate::{Error, Result};
+use crate::trajectory::number::{push_hundredths, push_integer, rounded};
+use crate::trajectory::{Recording, Track, VehicleClass};
+use lanesweep_support::atomic_file::{AtomicFile, StagedFile};
+use lanesweep_support::{Error, Result};
 
 /// Writes a recording into `dir` (made if it is not there) as `NN_tracks.csv`, `NN_tracksMeta.csv` and
 /// `NN_recordingMeta.csv` with NN the recording's id, in place of files of these names.

@@ -5,7 +5,7 @@ use super::preset::Preset;
 use super::raw::{RawRecording, RawVehicle};
 use super::road::{median, range};
 use super::samples::{AT, OTHER_CLOCK, Sample, Samples};
-use crate::support::readable::significant;
+use lanesweep_support::readable::significant;
 
 /// Times of a frame that are farther apart belong to two recordings, s.
 const SAME_TIME_S: f64 = 1.0;

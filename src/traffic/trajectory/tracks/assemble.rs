@@ -17,8 +17,8 @@ use super::samples::{
 };
 use super::smooth::{central, savitzky_golay};
 use super::understanding::{Comparison, Understanding};
-use crate::traffic::trajectory::{Carriageway, Loaded, NO_LANE, Recording, Track};
-use crate::{Error, Place, Result};
+use crate::trajectory::{Carriageway, Loaded, NO_LANE, Recording, Track};
+use lanesweep_support::{Error, Place, Result};
 
 impl Placed {
     /// Directions of the road at its samples. They are computed again, because memory would hold two numbers a sample.

@@ -5,7 +5,7 @@ use super::preset::{Preset, Reference};
 use super::raw::RawVehicle;
 use super::road::{median, unit};
 use super::samples::{HEADING_X, HEADING_Y, Sample, X, Y};
-use crate::traffic::trajectory::VehicleClass;
+use crate::trajectory::VehicleClass;
 
 /// Length and width where the file has none, m.
 const USUAL_CAR_M: [f64; 2] = [4.6, 1.9];

@@ -5,11 +5,11 @@ use std::collections::HashSet;
 use super::preset::{Preset, Side};
 use super::road::{median, range};
 use super::understanding::{Understanding, median_of};
-use crate::support::plausibility::{Doubts, Implausible, NOISE_MPS, Quantity};
-use crate::support::readable::{significant, value};
-use crate::traffic::trajectory::motion::{Impossible, JUMP_ACROSS_M, JUMP_ALONG_M, impossible, jumps};
-use crate::traffic::trajectory::overlap::overlaps;
-use crate::traffic::trajectory::{NO_LANE, Recording, Track, VehicleClass};
+use crate::trajectory::motion::{Impossible, JUMP_ACROSS_M, JUMP_ALONG_M, impossible, jumps};
+use crate::trajectory::overlap::overlaps;
+use crate::trajectory::{NO_LANE, Recording, Track, VehicleClass};
+use lanesweep_support::plausibility::{Doubts, Implausible, NOISE_MPS, Quantity};
+use lanesweep_support::readable::{significant, value};
 
 /// Positions and speeds that differ by more than this fraction do not belong together; good data differ by less than 2 %.
 const MAX_SPEED_DIFFERENCE: f64 = 0.05;

@@ -37,10 +37,10 @@ use rows::{Columns, Rows};
 use super::Loaded;
 use super::highd::made_up;
 use super::inputs::files_of;
-use crate::support::atomic_file::folder_of;
-use crate::support::files::file_name;
-use crate::support::input_file::unpacked;
-use crate::{Error, Place, Result};
+use lanesweep_support::atomic_file::folder_of;
+use lanesweep_support::files::file_name;
+use lanesweep_support::input_file::unpacked;
+use lanesweep_support::{Error, Place, Result};
 
 /// Names of recordings with this word are synthetic, because tables of tracks have no other place to say so.
 pub const SYNTHETIC: &str = "SYNTHETIC";

@@ -7,8 +7,8 @@ use super::raw::{RawRecording, RawVehicle};
 use super::road::{cross, dot, median, range, unit};
 use super::samples::{AT, OTHER_CLOCK, Sample, Samples, X, Y, between};
 use super::understanding::Understanding;
-use crate::support::readable::{significant, value};
-use crate::{Error, Place, Result};
+use lanesweep_support::readable::{significant, value};
+use lanesweep_support::{Error, Place, Result};
 
 /// A sample this far off the raster of times, in frames, is interpolated.
 const OFF_RASTER: f64 = 0.02;

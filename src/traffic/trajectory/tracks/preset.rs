@@ -6,10 +6,10 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::roles::{ColumnName, Role};
-use crate::settings;
-use crate::support::input_file;
-use crate::support::plain_text::{nearest, sha256};
-use crate::{Error, Place, Result};
+use lanesweep_support::input_file;
+use lanesweep_support::plain_text::{nearest, sha256};
+use lanesweep_support::settings;
+use lanesweep_support::{Error, Place, Result};
 
 /// Columns by their meaning.
 pub(super) type NamedColumns = BTreeMap<Role, ColumnName>;

@@ -12,10 +12,10 @@ use super::samples::{
     X, Y, Y_ACCELERATION, Y_SPEED, number,
 };
 use super::times::TIME_OF_DAY;
-use crate::support::input_file::packed_or_not;
-use crate::support::plain_text::nearest;
-use crate::traffic::trajectory::csv_table::FileChecksum;
-use crate::{Error, Place, Result};
+use crate::trajectory::csv_table::FileChecksum;
+use lanesweep_support::input_file::packed_or_not;
+use lanesweep_support::plain_text::nearest;
+use lanesweep_support::{Error, Place, Result};
 
 /// Maximum number of names of lanes, and of classes, of a recording; more are none.
 const MAX_NAMES: usize = 65_536;

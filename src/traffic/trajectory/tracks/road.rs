@@ -64,7 +64,7 @@ fn angle(a: [f64; 2]) -> f64 {
 }
 
 /// The median; NaN without values.
-pub(in crate::traffic::trajectory) fn median(values: &mut [f64]) -> f64 {
+pub(in crate::trajectory) fn median(values: &mut [f64]) -> f64 {
     if values.is_empty() {
         return f64::NAN;
     }

@@ -8,10 +8,10 @@ use std::path::{Path, PathBuf};
 use super::is_parquet;
 use super::roles::{ColumnName, Role};
 use super::times::{DATES, FoundTime, time_of_text, unit_of_time};
-use crate::support::table::{Cell as TableCell, TableFormat, TableReader};
-use crate::traffic::trajectory::csv_table::{CsvColumn, CsvFormat, CsvTable, FileChecksum};
-use crate::traffic::trajectory::number;
-use crate::{Error, Place, Result};
+use crate::trajectory::csv_table::{CsvColumn, CsvFormat, CsvTable, FileChecksum};
+use crate::trajectory::number;
+use lanesweep_support::table::{Cell as TableCell, TableFormat, TableReader};
+use lanesweep_support::{Error, Place, Result};
 
 /// Columns by role: position in the rows, and the factor to SI units.
 #[derive(Debug)]

@@ -5,9 +5,9 @@ use serde::Serialize;
 use super::LoadedTracks;
 use super::preset::Preset;
 use super::road::median;
-use crate::support::readable::{count, significant};
-use crate::traffic::trajectory::{Loaded, Noise, Recording, Track, VehicleClass};
-use crate::{Error, Place, Result};
+use crate::trajectory::{Loaded, Noise, Recording, Track, VehicleClass};
+use lanesweep_support::readable::{count, significant};
+use lanesweep_support::{Error, Place, Result};
 
 /// So far beyond the lane of its `laneId` a centre counts as misplaced, m: in lane changes `laneId` may change a little late.
 const MARGIN_M: f64 = 0.5;
@@ -119,7 +119,7 @@ impl Understanding {
     ///
     /// # Errors
     /// [`Error::Input`] if no vehicle is left.
-    pub(in crate::traffic::trajectory) fn of_highd(mut loaded: Loaded, place: &Place) -> Result<LoadedTracks> {
+    pub(in crate::trajectory) fn of_highd(mut loaded: Loaded, place: &Place) -> Result<LoadedTracks> {
         let recording = &loaded.recording;
         let mut about = Understanding::new(&recording.id);
         std::mem::take(&mut loaded.notes).into_iter().for_each(|note| about.warn(note));
