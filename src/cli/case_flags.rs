@@ -8,6 +8,7 @@ use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
 use super::arguments::{Arguments, FromArguments};
 use lanesweep_engine::Headway;
 use lanesweep_model::driver::ModelId;
+use lanesweep_model::plausibility::{Doubts, Implausible};
 use lanesweep_model::profile::Profile;
 use lanesweep_model::scenario::{
     CaseFile, CaseNumber, CaseParameters, CaseRow, NUMBERS, ParameterRows, PlainCase, RowPlace, Written, si,
@@ -15,7 +16,6 @@ use lanesweep_model::scenario::{
 use lanesweep_run::check::Subject;
 use lanesweep_run::reopen::TracedCase;
 use lanesweep_support::input_file::{self, plain_name};
-use lanesweep_support::plausibility::{Doubts, Implausible};
 use lanesweep_support::table::{NameUnit, TableFormat, TableReader};
 use lanesweep_support::{Error, Place, Result};
 

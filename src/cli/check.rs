@@ -12,6 +12,7 @@ use super::format::FormatFlag;
 use super::source::{PlausibilityFlag, scenarios_of};
 use super::{COMMIT, Exit, Output};
 use lanesweep_model::driver::ModelId;
+use lanesweep_model::plausibility::Doubts;
 use lanesweep_model::profile::Profile;
 use lanesweep_model::scenario::{Category, Scenario};
 use lanesweep_report::case_identity::CaseIdentity;
@@ -19,7 +20,6 @@ use lanesweep_report::case_sheet::CaseSheet;
 use lanesweep_run::check::{Check as Checked, Subject};
 use lanesweep_support::files::{check_output, write_atomically};
 use lanesweep_support::input_file::{self, plain_name};
-use lanesweep_support::plausibility::Doubts;
 use lanesweep_support::table::TableFormat;
 use lanesweep_support::{Error, Place, Result};
 

@@ -13,6 +13,7 @@ use super::source::complain_of;
 use super::{Exit, Output};
 use lanesweep_engine::Executor;
 use lanesweep_model::driver::ModelId;
+use lanesweep_model::plausibility::{Doubts, Implausible};
 use lanesweep_model::profile::Profile;
 use lanesweep_report::case_identity::CaseIdentity;
 use lanesweep_report::case_sheet::CaseSheet;
@@ -20,7 +21,6 @@ use lanesweep_report::case_table::{CaseAnswer, CaseAnswers};
 use lanesweep_run::check::{Check, Subject, nominal_verdicts};
 use lanesweep_support::files::make_folder_of;
 use lanesweep_support::input_file::unchanged;
-use lanesweep_support::plausibility::{Doubts, Implausible};
 use lanesweep_support::{Error, Place, Result};
 
 /// Rows that are judged together, and rows whose lanes are planned together.

@@ -7,10 +7,10 @@ use super::arguments::from_arguments;
 use lanesweep_engine::Headway;
 use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::ModelId;
+use lanesweep_model::plausibility::Quantity;
 use lanesweep_model::scenario::Category;
 use lanesweep_model::scenario::Driven;
 use lanesweep_model::scenario::parameterization::Parameterization;
-use lanesweep_support::plausibility::Quantity;
 use lanesweep_support::ranges::refuse_repeats;
 use lanesweep_support::{Error, Place, Result};
 

@@ -11,6 +11,7 @@ pub mod criterion;
 #[macro_use]
 pub mod driver;
 pub mod motion;
+pub mod plausibility;
 pub mod profile;
 pub mod scalar;
 pub mod scenario;

@@ -324,9 +324,9 @@ mod tests {
         assert_eq!(left, Vec::<&str>::new());
     }
 
-    /// Keys, values and ranges whose results are not normal numbers in binary32.
+    /// Values whose results are not normal numbers in binary32, and one in another unit.
     #[test]
-    fn constants_outside_binary32_are_refused_by_key() {
+    fn constants_outside_their_range_are_refused_by_key() {
         for (key, value) in [
             ("fsm.comfortable_deceleration_mps2", 1e-300),
             ("fsm.comfortable_deceleration_mps2", 1e300),
@@ -334,6 +334,8 @@ mod tests {
             ("cchdm.lateral_gate_m", -1e-42),
             ("criteria.jerk_mps3", 1e-30),
             ("frame.default_length_m", f64::INFINITY),
+            // In g.
+            ("fsm.max_deceleration_mps2", 0.774),
         ] {
             let mut table = toml::Value::try_from(Profile::load("paper").unwrap()).unwrap();
             let (of, name) = key.split_once('.').unwrap();

@@ -7,9 +7,9 @@ use lanesweep_engine::{
     Block, CaseTable, Chunk, EncodedBlock, Executor, Headway, LaneCase, LanePlan, Outcome, Start, Units, Wanted,
 };
 use lanesweep_model::driver::ModelId;
+use lanesweep_model::plausibility::{Doubts, Implausible};
 use lanesweep_model::profile::Profile;
 use lanesweep_model::scenario::{CaseParameters, Category, Tables};
-use lanesweep_support::plausibility::{Doubts, Implausible};
 use lanesweep_support::{Error, Place, Result};
 
 /// Name of the only variant.

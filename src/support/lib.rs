@@ -1,7 +1,7 @@
 //! Support that is independent of traffic: errors, files, tables, locks, and texts and numbers for people.
 //!
-//! This module holds the error type, atomic files, run directories and their locks, tables in three formats, ranges of
-//! settings, and plausibility of input. All other modules may use it; it uses none of them.
+//! This module holds the error type, atomic files, run directories and their locks, tables in three formats, and ranges of
+//! settings. All other modules may use it; it uses none of them.
 
 pub mod atomic_file;
 pub mod cancel;
@@ -10,7 +10,6 @@ pub mod files;
 pub mod input_file;
 pub mod lock;
 pub mod plain_text;
-pub mod plausibility;
 pub mod ranges;
 pub mod readable;
 pub mod run_folder;

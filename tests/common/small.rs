@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use lanesweep::Result;
-use lanesweep::support::plausibility::Implausible;
+use lanesweep::model::plausibility::Implausible;
 use lanesweep::traffic::trajectory::highd::{self, HighdFiles};
 use lanesweep::traffic::trajectory::{Carriageway, InputFile, Loaded, Recording, Track, VehicleClass};
 

@@ -11,10 +11,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use arrow_array::{ArrayRef, Float64Array, StringArray};
+use lanesweep::model::plausibility::Implausible;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::read_scenario_file;
-use lanesweep::support::plausibility::Implausible;
 use parquet::basic::Compression;
 
 use lanesweep::report::lanes::columns;

@@ -1,7 +1,7 @@
 //! S' given as series: of other programs, and of decompositions fitted on other folds.
 
+use lanesweep::model::plausibility::Implausible;
 use lanesweep::scenario::{Category, read_scenario_file};
-use lanesweep::support::plausibility::Implausible;
 
 use crate::common::program::{done, ran, said, words};
 
@@ -30,15 +30,14 @@ fn s_prime_of_other_programs_and_of_bases_of_other_folds_are_scored() {
     }
     // Rows moved by one: S' of one scenario has the id of the next.
     let lines = std::fs::read_to_string(of("scenarios.jsonl")).unwrap();
-    let rows = || lines.lines().skip(1).map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+    let rows = || lines.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
     let cut_ins: Vec<_> = rows().filter(|row| row["category"] == "cut_in" && row["kept"] == true).collect();
     let moved = cut_ins.iter().zip(cut_ins.iter().cycle().skip(1)).map(|(own, other)| {
         let mut row = other.clone();
         row["id"] = own["id"].clone();
         format!("{row}\n")
     });
-    let header = lines.lines().next().unwrap();
-    std::fs::write(of("moved.jsonl"), format!("{header}\n{}", moved.collect::<String>())).unwrap();
+    std::fs::write(of("moved.jsonl"), moved.collect::<String>()).unwrap();
     let warned = |name: &str| {
         said(dir.path(), &format!("{} {name} --categories cut-in --out ids", &study[3..])).1.contains("check the ids")
     };

@@ -3,11 +3,11 @@
 
 use std::path::Path;
 
+use lanesweep::model::plausibility::Implausible;
 use lanesweep::scenario::{
     Category, Ego, Other, Scenario, Side, read_scenario_file, read_scenarios, write_scenarios, write_scenarios_to,
 };
 use lanesweep::support::error::Error;
-use lanesweep::support::plausibility::Implausible;
 use serde_json::Value;
 
 use crate::common;

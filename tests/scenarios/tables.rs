@@ -9,9 +9,9 @@ use crate::common::tables::made;
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use lanesweep::model::plausibility::LIMITS;
 use lanesweep::scenario::{Category, Ego, Other, Scenario, Side, read_scenarios, write_scenarios, write_scenarios_to};
 use lanesweep::stats::density::write_density;
-use lanesweep::support::plausibility::LIMITS;
 use made::{Read, read};
 use proptest::prelude::*;
 

@@ -4,7 +4,7 @@ use crate::common::exid::Plain;
 use crate::common::small::{self, Texts, cruising};
 
 use lanesweep::Error;
-use lanesweep::support::plausibility::Implausible;
+use lanesweep::model::plausibility::Implausible;
 use lanesweep::traffic::trajectory::Recording;
 use lanesweep::traffic::trajectory::highd;
 

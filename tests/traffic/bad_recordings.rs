@@ -4,7 +4,7 @@ use std::fs;
 
 use crate::common::small::{self, Texts, edit_line, with_field, with_repeated_line, without_column, without_line};
 use lanesweep::Error;
-use lanesweep::support::plausibility::Implausible;
+use lanesweep::model::plausibility::Implausible;
 use lanesweep::traffic::trajectory::Track;
 use lanesweep::traffic::trajectory::highd;
 use proptest::prelude::*;

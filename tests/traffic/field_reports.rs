@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use lanesweep::model::plausibility::Implausible;
 use lanesweep::scenario::{Category, Scenario, problem_of, write_scenarios};
-use lanesweep::support::plausibility::Implausible;
 use lanesweep::traffic::Source;
 use lanesweep::traffic::mining::{Collection, MiningOptions};
 

@@ -4,7 +4,7 @@ use std::fs;
 use std::io::Write;
 use std::path::Path;
 
-use lanesweep::support::plausibility::Implausible;
+use lanesweep::model::plausibility::Implausible;
 use lanesweep::traffic::trajectory::highd;
 use lanesweep::traffic::trajectory::tracks::{self, Preset, TrackFile};
 use lanesweep::traffic::trajectory::{InputFile, Inputs, Recording};

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use lanesweep::support::plausibility::Implausible;
+use lanesweep::model::plausibility::Implausible;
 use lanesweep::traffic::mining::{MiningOptions, mine, mine_folder};
 use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
 use lanesweep::traffic::trajectory::tracks::{self, LoadedTracks, Understanding};

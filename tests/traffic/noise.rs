@@ -2,8 +2,8 @@
 
 use std::fs;
 
+use lanesweep::model::plausibility::Implausible;
 use lanesweep::scenario::Category;
-use lanesweep::support::plausibility::Implausible;
 use lanesweep::traffic::mining::{MiningOptions, count, mine, mine_inputs, noise_notes};
 use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
 use lanesweep::traffic::trajectory::{Inputs, Recording};

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
+use lanesweep::model::plausibility::Implausible;
 use lanesweep::scenario::{Category, read_scenario_file, write_scenarios};
-use lanesweep::support::plausibility::Implausible;
 use lanesweep::traffic::mining::{Collection, MiningOptions, mine_folder, mine_inputs};
 use lanesweep::traffic::trajectory::{Inputs, Track, VehicleClass};
 

@@ -4,8 +4,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use lanesweep::model::plausibility::Implausible;
 use lanesweep::scenario::{Category, Scenario};
-use lanesweep::support::plausibility::Implausible;
 use lanesweep::traffic::mining::{MiningOptions, mine};
 use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
 use lanesweep::traffic::trajectory::highd;

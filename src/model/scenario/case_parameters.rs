@@ -3,8 +3,8 @@
 use super::case_quantity::{CaseNumber, NUMBERS};
 use super::units::{self, Written};
 use super::{Category, LANE_WIDTH_M, PlainCase, check_headway, missing_parameter};
+use crate::plausibility::{Doubts, HELP, Quantity};
 use crate::profile::FrameProfile;
-use lanesweep_support::plausibility::{Doubts, HELP, Quantity};
 use lanesweep_support::table::{NameUnit, Resolved, resolve};
 use lanesweep_support::{Error, Place, Result};
 

@@ -4,7 +4,7 @@
 use super::CaseParameters;
 use super::units::{self, Written};
 use crate::category::Category;
-use lanesweep_support::plausibility::Quantity;
+use crate::plausibility::Quantity;
 use lanesweep_support::table::{NameUnit, Named};
 
 /// A quantity of a case.

@@ -1,8 +1,8 @@
 //! Checks that types cannot express: lengths, signs, what a category needs, and what is plausible on a road.
 
 use super::{Category, Other, Scenario};
+use crate::plausibility::{Doubts, HELP, Quantity};
 use lanesweep_support::error::{Error, Place, Result};
-use lanesweep_support::plausibility::{Doubts, HELP, Quantity};
 
 /// Refuses a scenario that could not be read back: JSON writes NaN as null, for instance. A recording may hold speeds
 /// and accelerations outside the range of scenarios.

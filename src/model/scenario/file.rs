@@ -17,9 +17,9 @@ use super::columns::{Leaf, leaves};
 use super::found::{ScenarioFile, ScenariosRead};
 use super::schema::wrong_field;
 use super::{Scenario, table_reader};
+use crate::plausibility::Implausible;
 use lanesweep_support::atomic_file::AtomicFile;
 use lanesweep_support::input_file;
-use lanesweep_support::plausibility::Implausible;
 use lanesweep_support::table::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter};
 use lanesweep_support::{Error, Place, Result};
 

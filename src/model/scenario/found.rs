@@ -4,8 +4,8 @@ use std::collections::{HashMap, HashSet};
 
 use super::check::{Problem, admit, name};
 use super::{Category, Scenario};
+use crate::plausibility::{Doubts, Implausible};
 use lanesweep_support::error::{Error, Place, Result};
-use lanesweep_support::plausibility::{Doubts, Implausible};
 
 /// At most one scenario in this many may be unusable; otherwise the file is probably not a scenario file.
 const MAX_BAD_ONE_IN: u64 = 10;

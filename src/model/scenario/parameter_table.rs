@@ -10,8 +10,8 @@ use super::columns::{Chosen, HELP, choose};
 use super::found::{ScenarioFile, ScenariosRead};
 use super::units::{Written, si};
 use super::{Category, Ego, Lateral, Other, PlainCase, Scenario, Side, Speed};
+use crate::plausibility::{Doubts, Implausible};
 use lanesweep_support::error::{Error, Place, Result};
-use lanesweep_support::plausibility::{Doubts, Implausible};
 use lanesweep_support::table::{Named, Row, TableReader};
 
 /// Columns that are texts; those of the numbers of a case follow, then [`RATE`].

@@ -12,9 +12,9 @@ use super::columns::{Chosen, HELP, Leaf, choose, leaves, names, number};
 use super::found::{ScenarioFile, ScenariosRead};
 use super::schema::wrong_field;
 use super::{Scenario, parameter_table};
+use crate::plausibility::Implausible;
 use lanesweep_support::error::{Error, Place, Result};
 use lanesweep_support::input_file;
-use lanesweep_support::plausibility::Implausible;
 use lanesweep_support::table::{Named, Resolved, Row, TableFormat, TableReader, resolve};
 
 /// Reads a table of scenarios.

@@ -3,9 +3,9 @@
 use super::axis::GridAxis;
 use super::parameter::MapParameter;
 use super::{CaseStyle, Grid, GridParts, jrc_case};
+use lanesweep_model::plausibility::Doubts;
 use lanesweep_model::profile::Profile;
 use lanesweep_model::scenario::{CaseQuantity, Category, LANE_WIDTH_M};
-use lanesweep_support::plausibility::Doubts;
 use lanesweep_support::{Error, Place, Result};
 
 /// A grid as text: an axis is `NAME=FROM..TO/STEP` or `NAME=A,B,C`.

@@ -2,10 +2,10 @@
 
 use std::sync::LazyLock;
 
+use lanesweep_model::plausibility::{Doubts, HELP, Quantity};
 use lanesweep_model::profile::Profile;
 use lanesweep_model::scenario::{CaseNumber, CaseQuantity, Category, LANE_WIDTH_M, NUMBERS, PlainCase, check_headway};
 use lanesweep_support::plain_text::nearest;
-use lanesweep_support::plausibility::{Doubts, HELP, Quantity};
 use lanesweep_support::{Error, Place, Result};
 
 /// A parameter as named in flags, tables and files.

@@ -7,11 +7,11 @@ use rayon::prelude::*;
 
 use super::folds::folds;
 use crate::score::CROSS_VALIDATED;
+use lanesweep_model::plausibility::Implausible;
 use lanesweep_model::scenario::parameterization::{
     Parameterization, ParameterizationOptions, ReducedScenario, Reduction,
 };
 use lanesweep_model::scenario::{Category, Scenario, ScenarioFile, read_scenario_file};
-use lanesweep_support::plausibility::Implausible;
 use lanesweep_support::{Error, Place, Result};
 
 /// S' of the scenarios of a category, by their ids.

@@ -15,8 +15,8 @@ use super::options::MiningOptions;
 use super::{cut_in, cut_out, lvd};
 use crate::trajectory::generator::{GeneratorOptions, generate_one};
 use crate::trajectory::{FileChecksum, InputFile, Inputs, Loaded, Recording};
+use lanesweep_model::plausibility::Implausible;
 use lanesweep_model::scenario::{Category, Scenario, ScenarioFile, mined_id, usable};
-use lanesweep_support::plausibility::Implausible;
 use lanesweep_support::readable;
 use lanesweep_support::{Error, Place, Result};
 

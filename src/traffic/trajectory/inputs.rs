@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use super::highd::{self, HighdFiles};
 use super::recording::Loaded;
 use super::tracks::{self, HIGHD, LoadedTracks, Preset, TrackFile, Understanding};
+use lanesweep_model::plausibility::Implausible;
 use lanesweep_support::atomic_file::folder_of;
 use lanesweep_support::files::file_name;
 use lanesweep_support::input_file::unpacked;
-use lanesweep_support::plausibility::Implausible;
 use lanesweep_support::{Error, Place, Result};
 
 /// Recordings whose format is known: highD's, or that of a preset.

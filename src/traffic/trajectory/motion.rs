@@ -3,7 +3,7 @@
 
 use super::noise::Noise;
 use super::recording::{Recording, Track};
-use lanesweep_support::plausibility::{Doubts, Quantity};
+use lanesweep_model::plausibility::{Doubts, Quantity};
 use lanesweep_support::readable::{significant, value};
 
 /// A speed that differs so much from what the positions around it tell contradicts them, m/s.

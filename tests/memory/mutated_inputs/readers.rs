@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use lanesweep::engine::{Backend, CpuBackend, Headway, LanePlan, Partial, SampleTally, Wanted};
 use lanesweep::model::criterion::Criterion;
+use lanesweep::model::plausibility::Implausible;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::{Counted, Journal, Ledger, MergeableCounts, read_part, read_sealed_line};
 use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, WeightedTally, plan_samples, read_proposal};
@@ -14,7 +15,6 @@ use lanesweep::scenario::parameterization::ParameterizationOptions;
 use lanesweep::scenario::{Category, Scenario, read_scenarios};
 use lanesweep::stats::density::{DensityModel, Exposure, read_density};
 use lanesweep::stats::random::Stream;
-use lanesweep::support::plausibility::Implausible;
 use lanesweep::traffic::mining::{MiningOptions, mine, mine_folder};
 use lanesweep::traffic::trajectory::tracks::{Preset, TrackFile};
 use lanesweep::traffic::trajectory::{InputFile, Inputs, Loaded};

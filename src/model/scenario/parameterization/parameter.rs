@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use super::options::ParameterizationOptions;
 use super::series::{lateral_speed, mean_acceleration};
 use super::sizes::vehicle_ahead;
+use crate::plausibility::Quantity;
 use crate::scenario::{Category, Scenario};
-use lanesweep_support::plausibility::Quantity;
 use lanesweep_support::{Error, Place, Result};
 
 /// Minimum duration T of a valid point and of a reconstruction, s.

@@ -7,7 +7,7 @@ use super::inventory::HighdFiles;
 use crate::trajectory::csv_table::{CsvColumn, CsvTable, FileChecksum, excerpt};
 use crate::trajectory::number;
 use crate::trajectory::{Carriageway, VehicleClass};
-use lanesweep_support::plausibility::{Doubts, HELP, Quantity};
+use lanesweep_model::plausibility::{Doubts, HELP, Quantity};
 use lanesweep_support::{Error, Place, Result};
 
 /// Content of `recordingMeta`.

@@ -9,8 +9,8 @@ use super::meta::{self, RecordingMeta, VehicleMeta};
 use crate::trajectory::Loaded;
 use crate::trajectory::csv_table::{CsvColumn, CsvTable};
 use crate::trajectory::{NO_LANE, Recording, Track};
+use lanesweep_model::plausibility::{Doubts, HELP, Implausible, Quantity};
 use lanesweep_support::atomic_file::folder_of;
-use lanesweep_support::plausibility::{Doubts, HELP, Implausible, Quantity};
 use lanesweep_support::{Error, Result};
 
 /// Like [`read_checked`], but accepts implausible values.

@@ -8,7 +8,7 @@ use super::understanding::{Understanding, median_of};
 use crate::trajectory::motion::{Impossible, JUMP_ACROSS_M, JUMP_ALONG_M, impossible, jumps};
 use crate::trajectory::overlap::overlaps;
 use crate::trajectory::{NO_LANE, Recording, Track, VehicleClass};
-use lanesweep_support::plausibility::{Doubts, Implausible, NOISE_MPS, Quantity};
+use lanesweep_model::plausibility::{Doubts, Implausible, NOISE_MPS, Quantity};
 use lanesweep_support::readable::{significant, value};
 
 /// Positions and speeds that differ by more than this fraction do not belong together; good data differ by less than 2 %.

@@ -111,14 +111,14 @@ impl Quantity {
         let hint = hint.map_or(String::new(), |(unit, per_own)| {
             format!(
                 "; {} looks like {unit}: {} {}",
-                crate::readable::value(value),
-                crate::readable::value(value / per_own),
+                lanesweep_support::readable::value(value),
+                lanesweep_support::readable::value(value / per_own),
                 of.unit
             )
         });
         format!(
             "{} {} {words} for {article} {} ({min} to {max} {}){hint}",
-            crate::readable::value(value),
+            lanesweep_support::readable::value(value),
             of.unit,
             of.name,
             of.unit
