@@ -1,7 +1,7 @@
 //! Atomic writing of report files.
 
 use std::io::{ErrorKind, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::atomic_file::{AtomicFile, folder_of};
 use crate::input_file::claim_output;
@@ -102,6 +102,19 @@ pub fn write_inside(path: &Path, produce: impl FnOnce(&mut dyn Write) -> std::io
     let mut file = AtomicFile::create_inside(path)?;
     produce(&mut file).map_err(|e| Error::io(path, "write", e))?;
     file.stage()?.publish()
+}
+
+/// The files of a folder, sorted; hidden ones are left out.
+///
+/// # Errors
+/// [`Error::Io`] if the folder cannot be listed.
+pub fn files_of(folder: &Path) -> Result<Vec<PathBuf>> {
+    let listed = std::fs::read_dir(folder).map_err(|e| Error::io(folder, "list", e))?;
+    let is_hidden = |path: &PathBuf| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
+    let mut files: Vec<PathBuf> =
+        listed.flatten().map(|entry| entry.path()).filter(|path| !path.is_dir() && !is_hidden(path)).collect();
+    files.sort();
+    Ok(files)
 }
 
 #[cfg(test)]

@@ -3,7 +3,6 @@
 
 use serde::Serialize;
 
-use super::against_recorded::NoTraffic;
 use super::sample_options::SampleOptions;
 use super::uncertainty::Uncertainty;
 use lanesweep_engine::{LanePlan, SampleTally, cell_of};
@@ -13,6 +12,16 @@ use lanesweep_stats::density::{Exposure, Rate, normal_quantile};
 use lanesweep_stats::estimate::{
     Clusters, Counts, Estimate, Interval, Ratio, StopReason, Warning, cluster_rate, from_clusters, from_counts,
 };
+
+/// What draws without possible traffic are of an estimate: the vehicle that cuts out drives through the one ahead of it. Maps and
+/// tables of cases leave them out by the same rule.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct NoTraffic {
+    /// Their fraction of the draws.
+    pub fraction: f64,
+    /// The probability that a draw with possible traffic fails.
+    pub possible_probability: f64,
+}
 
 /// An estimate with its model, criterion and headway.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -19,10 +19,10 @@ mod sample_run;
 mod uncertainty;
 mod weighted;
 
-pub use against_recorded::{NoTraffic, TRAFFIC_DRAWS};
+pub use against_recorded::TRAFFIC_DRAWS;
 pub use cheaper_estimator::Choice;
 pub use crude::{Checkpoint, CheckpointRow, CrudeRun};
-pub use estimate_rows::{EstimateRow, RecordedRatios, Risk, RiskRate};
+pub use estimate_rows::{EstimateRow, NoTraffic, RecordedRatios, Risk, RiskRate};
 pub use failing_lanes::FailingLane;
 pub use generator::{SAMPLE_PURPOSE, generator_of, generator_of_points};
 pub use limit_state::{LaneLimitState, limit_state, truncated};

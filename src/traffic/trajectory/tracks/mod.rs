@@ -36,9 +36,9 @@ use rows::{Columns, Rows};
 
 use super::Loaded;
 use super::highd::made_up;
-use super::inputs::files_of;
 use lanesweep_support::atomic_file::folder_of;
 use lanesweep_support::files::file_name;
+use lanesweep_support::files::files_of;
 use lanesweep_support::input_file::unpacked;
 use lanesweep_support::{Error, Place, Result};
 
