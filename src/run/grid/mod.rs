@@ -29,7 +29,7 @@ pub use lanesweep_model::scenario::CaseQuantity;
 
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::profile::Profile;
-use lanesweep_model::scenario::{Case, Category, NUMBERS, missing_parameter};
+use lanesweep_model::scenario::{Case, Category};
 use lanesweep_support::ranges::refuse_repeats;
 use lanesweep_support::{Error, Place, Result};
 
@@ -369,12 +369,11 @@ fn check_complete(category: Category, native_gap: bool, has: &dyn Fn(CaseQuantit
         Err(Error::usage(Place::item(what), problem, help))
     };
     let has_gap = has(CaseQuantity::Gap) || has(CaseQuantity::Thw);
-    let has_parameter = |key: &str| NUMBERS.iter().any(|number| number.key == key && has(number.quantity));
-    match missing_parameter(category, has_parameter) {
+    match CaseQuantity::needed(category).iter().find(|needed| !has(**needed)) {
         None => {}
-        Some("ego_speed") => return missing("the ego's speed", "ego_speed_kmh=60"),
-        Some("lateral_speed") => return missing("the lateral speed", "lateral_speed_mps=1"),
-        Some("acceleration") => return missing("the leader's deceleration", "deceleration_mps2=6"),
+        Some(CaseQuantity::EgoSpeed) => return missing("the ego's speed", "ego_speed_kmh=60"),
+        Some(CaseQuantity::LateralSpeed) => return missing("the lateral speed", "lateral_speed_mps=1"),
+        Some(CaseQuantity::Deceleration) => return missing("the leader's deceleration", "deceleration_mps2=6"),
         Some(_) => return missing("the gap to the vehicle ahead", "ahead_gap_m=50"),
     }
     if has(CaseQuantity::Gap) && has(CaseQuantity::Thw) || native_gap && has_gap {
