@@ -11,7 +11,8 @@ use lanesweep_model::driver::ModelId;
 use lanesweep_model::plausibility::{Doubts, Implausible};
 use lanesweep_model::profile::Profile;
 use lanesweep_model::scenario::{
-    CaseFile, CaseNumber, CaseParameters, CaseRow, NUMBERS, ParameterRows, PlainCase, RowPlace, Written, si,
+    CaseFile, CaseNumber, CaseParameters, CaseQuantity, CaseRow, NUMBERS, ParameterRows, PlainCase, RowPlace, Written,
+    si,
 };
 use lanesweep_run::check::Subject;
 use lanesweep_run::reopen::TracedCase;
@@ -111,7 +112,7 @@ pub(super) struct GivenCase {
 impl CaseFlags {
     /// Width of the lanes, m, if given.
     pub(super) fn lane_width_m(&self) -> Option<f64> {
-        self.parameters.lane_width
+        self.parameters[CaseQuantity::LaneWidth]
     }
 
     /// Values of `self` where given, otherwise those of a file.
@@ -131,18 +132,18 @@ impl CaseFlags {
 
     /// The initial distance, if given.
     pub(super) fn start(&self) -> Result<Option<Headway>> {
-        let is_given = self.parameters.gap.is_some() || self.parameters.thw.is_some();
+        let is_given = [CaseQuantity::Gap, CaseQuantity::Thw].iter().any(|start| self.parameters[*start].is_some());
         if is_given { self.over(GivenCase::default()).headway().map(Some) } else { Ok(None) }
     }
 
     /// Whether it gives a value of the case other than the width of the lanes.
     pub(super) fn says_more_than_lanes(&self) -> bool {
-        CaseParameters { lane_width: None, ..self.parameters.clone() } != CaseParameters::default()
+        self.parameters.given().iter().any(|key| *key != "lane_width")
     }
 
     /// Whether it gives a value of the case other than the ego's start.
     pub(super) fn says_more_than_a_start(&self) -> bool {
-        CaseParameters { gap: None, thw: None, ..self.parameters.clone() } != CaseParameters::default()
+        self.parameters.given().iter().any(|key| !matches!(*key, "gap" | "thw"))
     }
 
     /// The named models; `None` if none is named.
@@ -172,7 +173,7 @@ impl GivenCase {
     }
 
     pub(super) fn headway(&self) -> Result<Headway> {
-        let CaseParameters { gap, thw, .. } = self.parameters;
+        let (gap, thw) = (self.parameters[CaseQuantity::Gap], self.parameters[CaseQuantity::Thw]);
         self.located(self.parameters.check_start())?;
         let start = gap.map(Headway::GapM).or(thw.map(Headway::thw));
         self.located(start.ok_or_else(|| {

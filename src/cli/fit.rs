@@ -176,11 +176,7 @@ fn text(facts: &DataProvenance, fitted: &[(PathBuf, DensityModel)]) -> String {
 }
 
 fn document(facts: &DataProvenance, fitted: &[(PathBuf, DensityModel)], settings: &[SettingRecord]) -> Result<String> {
-    let densities = fitted.iter().map(|(file, model)| {
-        let mut record = density::record(model);
-        record["file"] = file.display().to_string().into();
-        record
-    });
+    let densities = fitted.iter().map(|(file, model)| density::record(model, file));
     records::document(&serde_json::json!({
         "program": format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
         "data": facts.data,

@@ -139,16 +139,12 @@ impl Study {
             )?);
         }
         let data = source.describe(collection.synthetic);
-        let builder = study::Study::builder(&collection, profile)
-            .options(options)
-            .mining(config.mining)
-            .score(config.score)
-            .data(data)
-            .scenario_file_sha256(self.data.scenarios.as_deref().map(input_file::sha256).transpose()?)
-            // Synthetic recordings are calibrated to the published numbers, so both are shown if the headways are the
-            // same.
-            .published(self.published || (collection.synthetic && has_paper_headways))
-            .reference(config.study.reference);
+        let mut builder = study::Study::builder(&collection, profile);
+        (builder.options, builder.mining, builder.score, builder.data) = (options, config.mining, config.score, data);
+        builder.scenario_file_sha256 = self.data.scenarios.as_deref().map(input_file::sha256).transpose()?;
+        // Synthetic recordings are calibrated to the published numbers, so both are shown if the headways are the same.
+        builder.published = self.published || (collection.synthetic && has_paper_headways);
+        builder.reference = config.study.reference;
         let study = timed(&mut timings.plan_s, || builder.plan())?;
         console::warn(study.cases().left_out());
         Ok((study, timings))

@@ -9,7 +9,7 @@ use lanesweep_engine::{
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::plausibility::{Doubts, Implausible};
 use lanesweep_model::profile::Profile;
-use lanesweep_model::scenario::{CaseParameters, Category, Tables};
+use lanesweep_model::scenario::{CaseParameters, CaseQuantity, Category, Tables};
 use lanesweep_support::{Error, Place, Result};
 
 /// Name of the only variant.
@@ -140,7 +140,8 @@ fn encode(
     doubts: &mut Doubts,
 ) -> Result<(Category, LaneCase<f64>)> {
     let plain = parameters.checked_case(&profile.frame, doubts)?;
-    let start = match (parameters.gap, parameters.thw) {
+    let (gap_m, thw_s) = (parameters[CaseQuantity::Gap], parameters[CaseQuantity::Thw]);
+    let start = match (gap_m, thw_s) {
         (Some(gap_m), _) => Some(Start::Gap(gap_m)),
         (None, thw_s) => thw_s.map(Start::Headway),
     };
@@ -149,7 +150,7 @@ fn encode(
         (Some(start), true) => case = case.ahead_by(start.gap(plain.ego_speed_mps)),
         (None, false) => {}
         (Some(_), false) => {
-            let key = if parameters.gap.is_some() { "gap" } else { "thw" };
+            let key = if gap_m.is_some() { "gap" } else { "thw" };
             let problem = "the case has its own start, and headways are given for all cases";
             return Err(Error::usage(Place::item(key), problem, "leave out the column or option `thw`"));
         }
@@ -179,15 +180,13 @@ mod tests {
     use lanesweep_model::criterion::Criterion;
 
     fn row(category: &str, ego_speed: f64, gap: Option<f64>) -> CaseParameters {
-        CaseParameters {
-            category: Some(category.to_owned()),
-            ego_speed: Some(ego_speed),
-            speed: Some(20.0),
-            gap,
-            lateral_speed: (category == "cut-in").then_some(1.0),
-            acceleration: (category == "lvd").then_some(-6.0),
-            ..CaseParameters::default()
-        }
+        let mut row = CaseParameters { category: Some(category.to_owned()), ..CaseParameters::default() };
+        row[CaseQuantity::EgoSpeed] = Some(ego_speed);
+        row[CaseQuantity::OtherSpeed] = Some(20.0);
+        row[CaseQuantity::Gap] = gap;
+        row[CaseQuantity::LateralSpeed] = (category == "cut-in").then_some(1.0);
+        row[CaseQuantity::Deceleration] = (category == "lvd").then_some(-6.0);
+        row
     }
 
     fn plan(rows: Vec<CaseParameters>, headways: &[Headway]) -> Result<Cases> {
@@ -211,7 +210,7 @@ mod tests {
             let plain = row.plain_case(frame.default_length_m, frame.default_width_m).unwrap();
             let mut tables = Tables::default();
             let case = LaneCase::encode(&plain.case(frame.time_cap_s).unwrap(), &profile, &mut tables).cast::<f32>();
-            let headway = Headway::GapM(row.gap.unwrap());
+            let headway = Headway::GapM(row[CaseQuantity::Gap].unwrap());
             let trace = Trace::record(&profile, plain.category, &case, &tables.cast(), headway, model);
             assert_eq!(trace.outcome, *outcome, "{row:?} {model:?}");
             collisions += u32::from(outcome.verdicts.failed(Criterion::Collision));

@@ -94,8 +94,8 @@ proptest! {
             let (panel, i, j) = grid.places(cell);
             prop_assert_eq!(grid.cell(panel, i, j), cell);
             let point = grid.point(cell);
-            prop_assert_eq!(point.get(CaseQuantity::Gap), Some(grid.x().values[i]));
-            prop_assert_eq!(point.get(CaseQuantity::LateralSpeed), Some(grid.y().values[j]));
+            prop_assert_eq!(point.get(CaseQuantity::Gap), Some(grid.x.values[i]));
+            prop_assert_eq!(point.get(CaseQuantity::LateralSpeed), Some(grid.y.values[j]));
             prop_assert_eq!(point.get(CaseQuantity::EgoSpeed), Some(grid.panels()[panel][0]));
             prop_assert_eq!(point.get(CaseQuantity::OtherSpeed), Some(grid.panels()[panel][1]));
         }
@@ -195,15 +195,15 @@ fn moved(grid: &Grid, gap_m: f64, lateral_mps: f64) -> Grid {
         GridAxis { parameter: axis.parameter, values: axis.values.iter().map(|v| (v + by).max(0.0)).collect() }
     };
     Grid::new(GridParts {
-        name: grid.name().to_owned(),
-        category: grid.category(),
-        x: shifted(grid.x()),
-        y: shifted(grid.y()),
-        panel_axes: grid.panel_axes().to_vec(),
-        fixed: grid.fixed().to_vec(),
-        style: grid.style(),
-        native_gap: grid.has_native_gap(),
-        closing_only: grid.category() == Category::CutIn,
+        name: grid.name.clone(),
+        category: grid.category,
+        x: shifted(&grid.x),
+        y: shifted(&grid.y),
+        panel_axes: grid.panel_axes.to_vec(),
+        fixed: grid.fixed.to_vec(),
+        style: grid.style,
+        native_gap: grid.native_gap,
+        closing_only: grid.category == Category::CutIn,
     })
     .unwrap()
 }
@@ -220,7 +220,7 @@ fn crash_shares_of_the_jrc_are_known_as_far_as_rounding_does_not_decide() {
         let map = |grid: Grid| swept(&plan(grid));
         let nominal = map(preset.grid.clone());
         let moves = [(1e-4, 1e-5), (1e-4, -1e-5), (-1e-4, 1e-5), (-1e-4, -1e-5)];
-        let moved: Vec<GridMap> = if preset.grid.has_native_gap() {
+        let moved: Vec<GridMap> = if preset.grid.native_gap {
             // A distance that depends on the speed is no axis: another arithmetic decides ties in another way.
             let backend = CpuBackend::reference();
             let executor = Executor::new(&backend);
@@ -239,11 +239,11 @@ fn crash_shares_of_the_jrc_are_known_as_far_as_rounding_does_not_decide() {
             let share = percent(&nominal, at);
             println!(
                 "{:12} {:7} {share:6.2} %, known {known:4.1} %, rounding decides between {always:6.2} and {ever:6.2} %",
-                preset.grid.name(),
+                preset.grid.name,
                 model.name()
             );
-            assert!((always - 0.05..ever + 0.05).contains(&known), "{} {}", preset.grid.name(), model.name());
-            assert!((share - known).abs() < 0.5, "{} {}", preset.grid.name(), model.name());
+            assert!((always - 0.05..ever + 0.05).contains(&known), "{} {}", preset.grid.name, model.name());
+            assert!((share - known).abs() < 0.5, "{} {}", preset.grid.name, model.name());
             compared += 1;
         }
     }
@@ -261,7 +261,7 @@ fn shares_of_a_preset_vary_smoothly_with_the_time_step() {
                     let map = mapped(preset.grid.clone(), &profile, &preset.models);
                     let share = |at: usize| percent(&map, at);
                     let models = preset.models.iter().enumerate();
-                    models.map(|(at, m)| (format!("{} {}", preset.grid.name(), m.name()), share(at))).collect()
+                    models.map(|(at, m)| (format!("{} {}", preset.grid.name, m.name()), share(at))).collect()
                 };
                 Presets::Jrc.of(category, &profile).unwrap().into_iter().flat_map(|p| -> Vec<_> { of(p) }).collect()
             };
@@ -406,7 +406,7 @@ fn an_undecided_cell_has_a_neighbour_with_the_other_verdict_and_a_decided_one_ke
             let (panel, i, j) = grid.places(cell);
             let beside = |di: i64, dj: i64| {
                 let (i, j) = (i as i64 + di, j as i64 + dj);
-                let inside = (0..grid.x().len() as i64).contains(&i) && (0..grid.y().len() as i64).contains(&j);
+                let inside = (0..grid.x.len() as i64).contains(&i) && (0..grid.y.len() as i64).contains(&j);
                 inside.then(|| grid.cell(panel, i as usize, j as usize))
             };
             let around = [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, 1), (-1, 1), (1, -1)];
@@ -479,7 +479,7 @@ fn a_cell_without_a_conflict_is_a_case_without_one() {
                         let outcome = map.outcome(at, cell, Criterion::Collision);
                         let is_no_conflict = judged.verdicts.answer() == Answer::NoConflict;
                         let says_so = matches!(outcome, CellOutcome::NoConflict | CellOutcome::FailByReaction);
-                        assert_eq!(is_no_conflict, says_so, "{}, {:?}", grid.name(), grid.values(cell));
+                        assert_eq!(is_no_conflict, says_so, "{}, {:?}", grid.name, grid.values(cell));
                         if outcome == CellOutcome::NoConflict {
                             assert_eq!(outcome.label(), judged.verdicts.answer().label());
                         }

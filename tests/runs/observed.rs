@@ -43,7 +43,9 @@ fn s_and_every_s_prime_start_from_the_recorded_gap() {
 #[test]
 fn shards_from_recorded_gaps_give_the_counts_of_the_whole() {
     let data = mined(2);
-    let study = Study::builder(&data, Profile::load("paper").unwrap()).options(observed()).plan().unwrap();
+    let mut study = Study::builder(&data, Profile::load("paper").unwrap());
+    study.options = observed();
+    let study = study.plan().unwrap();
     let backend = CpuBackend::lane_arithmetic();
     let executor = Executor::new(&backend);
     let dir = tempfile::tempdir().unwrap();

@@ -208,15 +208,15 @@ fn geographic_coordinates_are_named_as_such() {
 /// Without a preset that names another unit; every codec of the usual programs.
 #[cfg(feature = "parquet")]
 #[test]
-fn parquet_with_gzip_or_lz4_and_instants_is_the_table() {
+fn parquet_with_gzip_or_lz4_and_microseconds_is_the_table_and_instants_are_refused() {
     use std::sync::Arc;
 
-    use arrow_array::{ArrayRef, Float64Array, StringArray, TimestampMicrosecondArray};
+    use arrow_array::{ArrayRef, Float64Array, Int64Array, StringArray, TimestampMicrosecondArray};
     use parquet::basic::{Compression, GzipLevel};
 
     let table = table();
     let right = from_frame_0(read("own.csv", table.text().as_bytes()).unwrap());
-    let column = |name: &String| -> ArrayRef {
+    let column = |name: &String, are_instants: bool| -> ArrayRef {
         let at = table.at(name);
         let texts = || table.rows.iter().map(move |row| row[at].as_str());
         let numbers = || texts().map(|text| text.parse::<f64>().unwrap());
@@ -224,7 +224,10 @@ fn parquet_with_gzip_or_lz4_and_instants_is_the_table() {
             "class" | "track_id" => Arc::new(StringArray::from_iter_values(texts())),
             "t" => {
                 let instants = numbers().map(|t| 1_740_823_200_000_000 + (1e6 * t).round() as i64);
-                Arc::new(TimestampMicrosecondArray::from_iter_values(instants))
+                match are_instants {
+                    true => Arc::new(TimestampMicrosecondArray::from_iter_values(instants)),
+                    false => Arc::new(Int64Array::from_iter_values(instants)),
+                }
             }
             _ => Arc::new(Float64Array::from_iter_values(numbers())),
         }
@@ -233,8 +236,12 @@ fn parquet_with_gzip_or_lz4_and_instants_is_the_table() {
     let path = dir.path().join("own.parquet");
     let gzip = Compression::GZIP(GzipLevel::default());
     for codec in [gzip, Compression::LZ4, Compression::LZ4_RAW, Compression::SNAPPY] {
-        let columns = table.header.iter().map(|name| (name.as_str(), column(name))).collect();
+        let columns = table.header.iter().map(|name| (name.as_str(), column(name, false))).collect();
         crate::common::tables::made::write(&path, columns, codec);
         assert!(from_frame_0(read("own.parquet", &fs::read(&path).unwrap()).unwrap()) == right, "{codec:?}");
     }
+    let columns = table.header.iter().map(|name| (name.as_str(), column(name, true))).collect();
+    crate::common::tables::made::write(&path, columns, gzip);
+    let error = read("own.parquet", &fs::read(&path).unwrap()).unwrap_err();
+    assert!(error.help().unwrap().contains("pl.col(\"t\").cast(pl.Int64) in Polars"), "{error:?}");
 }

@@ -240,7 +240,7 @@ pub(crate) fn burst<M: DriverModel<f32>, const RULES: u32>(
     take: impl Fn(&mut [[u32; LANES]], &[[u32; ROOM]], usize, Slots),
     turn: impl Fn(&mut Window, &TrackArrays<LANES>, &Words, &[f32]),
 ) {
-    let rules = const { Rules::from_bits(RULES) };
+    let rules = const { Rules::ALL[RULES as usize] };
     let (frame, criteria) = rules.applied(simulation.frame, simulation.criteria);
     let model = *simulation.model;
     let simulation =

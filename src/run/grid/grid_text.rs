@@ -79,14 +79,14 @@ impl Grid {
     /// set.
     pub fn held(&self, profile: &Profile) -> Vec<String> {
         let number = |value: f64| format!("{}", (value * 1e6).round() / 1e6);
-        let mut held: Vec<String> = (self.fixed().iter())
+        let mut held: Vec<String> = (self.fixed.iter())
             .map(|(parameter, value)| {
                 let mut label = parameter.label.to_owned();
                 label[..1].make_ascii_lowercase();
                 format!("{label} {} {}", number(*value), parameter.unit)
             })
             .collect();
-        let (category, is_jrc) = (self.category(), self.style() != CaseStyle::Plain);
+        let (category, is_jrc) = (self.category, self.style != CaseStyle::Plain);
         let point = self.point(0);
         let sets = |quantity| point.get(quantity).is_some();
         if !sets(CaseQuantity::OtherSpeed) {

@@ -156,7 +156,7 @@ impl GridMap {
              and gaps",
             frame.dt_s
         );
-        Err(Error::usage(Place::item(format!("map {}", plan.grid.name())), problem, help))
+        Err(Error::usage(Place::item(format!("map {}", plan.grid.name)), problem, help))
     }
 
     /// Number of cells.
@@ -211,7 +211,7 @@ fn meets(plan: &LanePlan) -> bool {
 /// Boundary lines between neighbouring cells of a panel that differ in kind. Each line follows cell edges from `(x, y)`
 /// to `(x, y)`, in cells from the panel's lower left corner. Straight runs are one line.
 pub fn boundary(grid: &Grid, kind: &dyn Fn(usize, usize) -> usize) -> Vec<((usize, usize), (usize, usize))> {
-    let (nx, ny) = (grid.x().len(), grid.y().len());
+    let (nx, ny) = (grid.x.len(), grid.y.len());
     let mut lines = Vec::new();
     for j in 1..ny {
         for (from, to) in runs(nx, &|i| kind(i, j - 1) != kind(i, j)) {

@@ -190,37 +190,18 @@ impl Point {
     /// # Errors
     /// [`Error::Usage`] for a time headway of a stationary ego.
     pub fn plain_case(&self, category: Category, profile: &Profile) -> Result<PlainCase> {
-        let value = |quantity, otherwise: f64| self.get(quantity).unwrap_or(otherwise);
-        let ego_speed_mps = value(CaseQuantity::EgoSpeed, 0.0);
-        let deceleration = value(CaseQuantity::Deceleration, 0.0);
-        check_headway(ego_speed_mps, self.get(CaseQuantity::Thw))?;
-        let speed_mps = value(CaseQuantity::OtherSpeed, ego_speed_mps);
+        let frame = &profile.frame;
+        let case = PlainCase::of(category, &|of| self.get(of), frame.default_length_m, frame.default_width_m);
+        let deceleration = self.get(CaseQuantity::Deceleration).unwrap_or(0.0);
+        check_headway(case.ego_speed_mps, self.get(CaseQuantity::Thw))?;
+        let speed_mps = case.speed_mps;
         if speed_mps < 0.0 {
             let problem = format!("the other vehicle would drive backwards, at {speed_mps} m/s");
             let help = "give relative speeds of at least minus the ego's speed; a map leaves such panels out, where both \
                         speeds belong to the panels (name other axes by option `x` and option `y`)";
             return Err(Error::usage(Place::item("relative_speed"), problem, help));
         }
-        let length_m = value(CaseQuantity::Length, profile.frame.default_length_m);
-        let width_m = value(CaseQuantity::Width, profile.frame.default_width_m);
-        let lane_width_m = value(CaseQuantity::LaneWidth, LANE_WIDTH_M);
-        Ok(PlainCase {
-            category,
-            ego_speed_mps,
-            speed_mps,
-            // Avoids a negative zero.
-            acceleration_mps2: if deceleration > 0.0 { -deceleration } else { 0.0 },
-            end_speed_mps: self.get(CaseQuantity::EndSpeed),
-            lateral_speed_mps: value(CaseQuantity::LateralSpeed, 0.0),
-            lateral_distance_m: value(CaseQuantity::LateralDistance, lane_width_m),
-            ahead_speed_mps: value(CaseQuantity::AheadSpeed, 0.0),
-            ahead_gap_m: value(CaseQuantity::AheadGap, 0.0),
-            length_m,
-            width_m,
-            ego_length_m: value(CaseQuantity::EgoLength, length_m),
-            ego_width_m: value(CaseQuantity::EgoWidth, width_m),
-            lane_width_m,
-            duration_s: None,
-        })
+        // Avoids a negative zero.
+        Ok(PlainCase { acceleration_mps2: if deceleration > 0.0 { -deceleration } else { 0.0 }, ..case })
     }
 }

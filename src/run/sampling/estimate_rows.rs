@@ -69,6 +69,28 @@ impl EstimateRow {
         self.headway == "all" || !all.iter().any(|row| row.headway == "all")
     }
 
+    /// Whether it is told: P over all headways, and rare failures by importance sampling.
+    pub fn is_told(&self, all: &[EstimateRow]) -> bool {
+        self.is_overall(all) || self.is_rare_beside(all)
+    }
+
+    /// Whether P is below one in the kernels: it comes from the tails of the density's kernels, not from data.
+    pub fn is_of_tails(&self, kernels: usize) -> bool {
+        self.estimate.probability * (kernels as f64) < 1.0
+    }
+
+    /// How many times the lanes of crude Monte Carlo its weights cost for the same interval; `None` if they saved some.
+    pub fn times_crude(&self) -> Option<f64> {
+        let reduction = self.estimate.variance_reduction;
+        (self.estimate.weights.is_some() && reduction < 1.0).then(|| 1.0 / reduction)
+    }
+
+    /// Why the run of these rows ended: the time limit tells more than the number of samples.
+    pub fn stopped(all: &[EstimateRow]) -> StopReason {
+        let stopped = all.iter().map(|row| row.estimate.stopped).max_by_key(|s| *s == StopReason::TimeLimit);
+        stopped.unwrap_or(StopReason::Samples)
+    }
+
     /// A row whose interval covers the draws alone.
     pub(crate) fn of_draws(
         model: ModelId,

@@ -99,51 +99,23 @@ pub struct Study {
 pub struct StudyBuilder<'a> {
     collection: &'a Collection,
     profile: Profile,
-    options: StudyOptions,
-    mining: MiningOptions,
-    score: ScoreOptions,
-    data: String,
-    scenario_file_sha256: Option<String>,
-    published: bool,
-    reference: bool,
+    /// Categories, models, headways, parameterizations [default: all, with the paper's headways].
+    pub options: StudyOptions,
+    /// Mining options of the scenarios, for the record.
+    pub mining: MiningOptions,
+    /// Options of the scores.
+    pub score: ScoreOptions,
+    /// Origin of the scenarios, for the report.
+    pub data: String,
+    /// SHA-256 of the file that the scenarios were read from, for the record.
+    pub scenario_file_sha256: Option<String>,
+    /// Shows the paper's published numbers with the results.
+    pub published: bool,
+    /// The lanes run in f64, by [`CpuBackend::reference`](lanesweep_engine::CpuBackend::reference).
+    pub reference: bool,
 }
 
 impl StudyBuilder<'_> {
-    /// Categories, models, headways, parameterizations [default: all, with the paper's headways].
-    pub fn options(self, options: StudyOptions) -> Self {
-        StudyBuilder { options, ..self }
-    }
-
-    /// Options of the scores.
-    pub fn score(self, score: ScoreOptions) -> Self {
-        StudyBuilder { score, ..self }
-    }
-
-    /// Mining options of the scenarios, for the record.
-    pub fn mining(self, mining: MiningOptions) -> Self {
-        StudyBuilder { mining, ..self }
-    }
-
-    /// Origin of the scenarios, for the report.
-    pub fn data(self, data: impl Into<String>) -> Self {
-        StudyBuilder { data: data.into(), ..self }
-    }
-
-    /// SHA-256 of the file that the scenarios were read from, for the record.
-    pub fn scenario_file_sha256(self, sha256: Option<String>) -> Self {
-        StudyBuilder { scenario_file_sha256: sha256, ..self }
-    }
-
-    /// Shows the paper's published numbers with the results.
-    pub fn published(self, published: bool) -> Self {
-        StudyBuilder { published, ..self }
-    }
-
-    /// Declares that the lanes run in f64, by [`CpuBackend::reference`](lanesweep_engine::CpuBackend::reference).
-    pub fn reference(self, reference: bool) -> Self {
-        StudyBuilder { reference, ..self }
-    }
-
     /// Plans the study.
     ///
     /// # Errors

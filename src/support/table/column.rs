@@ -192,9 +192,4 @@ pub trait TableRows {
     fn has_lists(&self) -> bool {
         false
     }
-
-    /// Whether a column has instants, which are numbers in seconds since 1970.
-    fn has_instants(&self, _column: usize) -> bool {
-        false
-    }
 }

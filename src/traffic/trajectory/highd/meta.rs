@@ -4,7 +4,7 @@
 use super::format::{FRAME_RATES_HZ, LANE_LINES_LIMIT, RECORDING_META_HEADER, TRACKS_META_HEADER, csv_format};
 use super::frame::{Direction, LaneNumbers};
 use super::inventory::HighdFiles;
-use crate::trajectory::csv_table::{CsvColumn, CsvTable, FileChecksum, excerpt};
+use crate::trajectory::csv_table::{CsvColumn, CsvTable, FileChecksum, quoted};
 use crate::trajectory::number;
 use crate::trajectory::{Carriageway, VehicleClass};
 use lanesweep_model::plausibility::{Doubts, HELP, Quantity};
@@ -155,7 +155,7 @@ fn markings(table: &CsvTable, column: CsvColumn) -> Result<Vec<f64>> {
     for part in text.trim_end_matches(';').split(';') {
         let line = number::real(part.as_bytes())
             .filter(|line| line.abs() <= number::REAL_LIMIT)
-            .ok_or_else(|| bad(format!("the lane line {} is not a finite number", excerpt(part))))?;
+            .ok_or_else(|| bad(format!("the lane line {} is not a finite number", quoted(part))))?;
         if let Some(&above) = lines.last()
             && line <= above
         {

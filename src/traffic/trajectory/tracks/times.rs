@@ -4,7 +4,6 @@
 pub(super) type FoundTime = &'static str;
 /// `08:15:30.25`: it begins again at midnight.
 pub(super) const TIME_OF_DAY: FoundTime = "time of day";
-pub(super) const DATES: FoundTime = "dates";
 
 /// What a time of this size is, and its factor to seconds; `None` for seconds. No recording is from the year 5138 or later.
 pub(super) fn unit_of_time(value: f64) -> Option<(FoundTime, f64)> {
@@ -20,7 +19,7 @@ pub(super) fn unit_of_time(value: f64) -> Option<(FoundTime, f64)> {
 pub(super) fn time_of_text(text: &str) -> Option<(FoundTime, f64)> {
     let text = text.replace(',', ".");
     if let Some(seconds) = seconds_of_date(&text) {
-        return Some((DATES, seconds));
+        return Some(("dates", seconds));
     }
     let parts: Option<Vec<f64>> =
         text.split(':').map(|part| part.parse().ok().filter(|value: &f64| *value >= 0.0)).collect();
