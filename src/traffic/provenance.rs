@@ -14,10 +14,9 @@ use super::trajectory::Inputs;
 use super::trajectory::generator::GeneratorOptions;
 use super::trajectory::highd::made_up;
 use lanesweep_model::scenario::{DataProvenance, Driven, ScenarioFile, read_scenario_file, write_scenarios_to};
-use lanesweep_support::Result;
-use lanesweep_support::input_file;
 use lanesweep_support::plain_text::hex;
 use lanesweep_support::plausibility::Implausible;
+use lanesweep_support::{Result, input_file};
 
 /// Source of scenarios.
 #[derive(Debug, Clone, PartialEq)]

@@ -6,8 +6,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use lanesweep_support::files::{remove_file, write_atomically};
-use lanesweep_support::input_file;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, input_file};
 
 /// Driven time and distance of the recordings that were searched for scenarios.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
