@@ -19,7 +19,7 @@ use lanesweep_report::host::{Host, SweepRecord};
 use lanesweep_report::map::MapReport;
 use lanesweep_run::grid::{self, Grid, GridText, MapGrids, MapOptions, MapResult, PARAMETERS, presets::Presets};
 use lanesweep_support::readable::{count, value};
-use lanesweep_support::run_folder::{MAP_RECORD, RunFolder};
+use lanesweep_support::run_folder::RunFolder;
 use lanesweep_support::{Error, Place, Result};
 
 /// Seed of the random selection of device lanes that the CPU recomputes.
@@ -107,7 +107,7 @@ impl Map {
         let map = grid::Map::plan(options, &profile)?;
         let plan_s = started.elapsed().as_secs_f64();
         let opened = configured.open_in(configured.settings.map.reference)?;
-        let folder = RunFolder::open(&self.out, MAP_RECORD)?;
+        let folder = RunFolder::open(&self.out, "map.json")?;
         let executor = opened.executor().with_recheck(RECHECK_SEED);
         let (units, started) = (Total::Exact(map.unit_count()), Instant::now());
         let MapResult { grids, summary } =

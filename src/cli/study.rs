@@ -22,7 +22,7 @@ use lanesweep_run::study::{self, ExternalReplay, ReferenceComparison, StudyOptio
 use lanesweep_support::files::{check_folder, check_output};
 use lanesweep_support::input_file;
 use lanesweep_support::readable;
-use lanesweep_support::run_folder::{Results, RunFolder, STUDY_RECORD};
+use lanesweep_support::run_folder::{Results, RunFolder};
 use lanesweep_support::{Error, Place, Result};
 use lanesweep_traffic::Source;
 
@@ -86,7 +86,7 @@ impl Study {
         self.guard_inputs(configured)?;
         match self.shards.plan_only || self.shards.is_part() {
             true => check_folder(&self.out)?,
-            false => drop(RunFolder::open(&self.out, STUDY_RECORD)?),
+            false => drop(RunFolder::open(&self.out, study::STUDY_RECORD)?),
         }
         let is_binary64 = configured.settings.study.reference;
         if let Some(path) = &self.shards.plan {

@@ -8,10 +8,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::criterion::CriteriaProfile;
 use crate::driver::{self, Bound, DriverProfile, ModelId};
-use lanesweep_support::input_file;
 use lanesweep_support::plain_text::nearest;
 use lanesweep_support::ranges::refuse_repeats;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, input_file};
 
 /// Maximum number of steps of a run.
 pub const MAX_STEPS: f64 = 4e6;

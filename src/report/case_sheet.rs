@@ -201,7 +201,7 @@ impl CaseSheet<'_> {
     pub fn json(&self) -> Result<String> {
         records::document(&record! {
             answer: self.answer(),
-            assumptions: self.profiles[0].assumptions(),
+            assumptions: records::sorted(&self.profiles[0].assumptions()),
             by_rule: self.by_rule_records(),
             case: self.case_numbers(),
             category: self.subject.category().key(),

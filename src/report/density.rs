@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::records::record;
+use super::records::{record, sorted};
 use lanesweep_stats::density::{DensityModel, Exposure, Rate, Refused, SearchEnd, ValidFraction, standard_deviation};
 use lanesweep_support::readable::{count, count_of, significant};
 use lanesweep_support::table::{Column, Digits, Table};
@@ -63,10 +63,10 @@ pub fn record(model: &DensityModel, file: &Path) -> impl Serialize {
     let mut parameters = parameters(model);
     parameters.columns[0].name = "name".into();
     record! {
-        bandwidth: model.kde.bandwidth(),
+        bandwidth: sorted(model.kde.bandwidth()),
         category: id.category.key(),
         description: id.description(),
-        exposure: &model.exposure,
+        exposure: sorted(&model.exposure),
         file: file.display().to_string(),
         found: provenance.found,
         kept: provenance.kept,
@@ -74,7 +74,7 @@ pub fn record(model: &DensityModel, file: &Path) -> impl Serialize {
         parameterization: id.key,
         parameters: parameters.records(),
         scenarios: model.kde.points().len(),
-        valid: &model.valid,
+        valid: sorted(&model.valid),
     }
 }
 

@@ -138,7 +138,7 @@ pub(super) fn outcome_cells(outcome: &Outcome<f64>, dt_s: f64) -> [Cell<'static>
 }
 
 /// How a lane ended, for a JSON document, in binary64.
-pub fn outcome_record(outcome: &Outcome<f64>, dt_s: f64) -> Map<String, Value> {
+pub(crate) fn outcome_record(outcome: &Outcome<f64>, dt_s: f64) -> Map<String, Value> {
     let value = |value: OutcomeValue| json_value(ColumnKind::Binary64, &value(outcome, dt_s));
     OUTCOME.iter().map(|&(name, .., of)| (name.to_owned(), value(of))).collect()
 }

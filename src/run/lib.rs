@@ -18,11 +18,11 @@ pub mod study;
 use std::path::Path;
 
 use lanesweep_support::files::check_run_folder;
-use lanesweep_support::run_folder::{ESTIMATE_RECORD, RunFolder, STUDY_RECORD};
+use lanesweep_support::run_folder::RunFolder;
 use lanesweep_support::{Error, Place, Result};
 use parts::{PLAN_FILE, Shard, kind_of};
-use sampling::{Sample, SampleResult};
-use study::{Study, StudyResult};
+use sampling::{ESTIMATE_RECORD, Sample, SampleResult};
+use study::{STUDY_RECORD, Study, StudyResult};
 
 /// A run with the merged result of its parts, bit for bit equal to that of the run in one piece.
 pub enum Merged {

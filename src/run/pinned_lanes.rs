@@ -4,9 +4,10 @@ use sha2::{Digest, Sha256};
 
 use super::sampling::{SAMPLE_PURPOSE, generator_of};
 use super::study::plan_file::{BlockHead, StudyHead, stripped};
-use lanesweep_engine::ENGINE_VERSION;
 use lanesweep_engine::verify::{SetOptions, random_plan, threshold_plan};
-use lanesweep_engine::{Backend, Constants, CpuBackend, Headway, LanePlan, Outcome, Silent, Start, Wanted, words};
+use lanesweep_engine::{
+    Backend, Constants, CpuBackend, ENGINE_VERSION, Headway, LanePlan, Outcome, Silent, Start, Wanted, words,
+};
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::profile::Profile;
 use lanesweep_model::scenario::parameterization::{

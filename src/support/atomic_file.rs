@@ -281,7 +281,7 @@ impl StagedFile {
     }
 
     /// Closes the file, for a caller that holds a lock on its folder; the number of open files per process is limited.
-    pub fn closed(mut self) -> Self {
+    pub(crate) fn closed(mut self) -> Self {
         self.file = None;
         self
     }

@@ -5,8 +5,7 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
-use crate::atomic_file::folder_of;
-use crate::atomic_file::{Live, is_named, refuse_link};
+use crate::atomic_file::{Live, folder_of, is_named, refuse_link};
 use crate::{Error, Place, Result};
 
 /// Maximum length of a lock file, bytes: a process id and an end of line are shorter.

@@ -14,19 +14,10 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::atomic_file::folder_of;
-use crate::atomic_file::{AtomicFile, Live, StagedFile, clear_stale, refuse_link, sync_folder};
+use crate::atomic_file::{AtomicFile, Live, StagedFile, clear_stale, folder_of, refuse_link, sync_folder};
 use crate::files::{file_name, make_folder, remove_file, write_inside};
-use crate::input_file;
 use crate::lock::FolderLock;
-use crate::{Error, Place, Result};
-
-/// Record of a study.
-pub const STUDY_RECORD: &str = "run.json";
-/// Record of a sampling run.
-pub const ESTIMATE_RECORD: &str = "estimate.json";
-/// Record of a map.
-pub const MAP_RECORD: &str = "map.json";
+use crate::{Error, Place, Result, input_file};
 
 /// Lists the files of the folder's run.
 const LIST: &str = "lanesweep-files.json";
@@ -307,8 +298,10 @@ mod tests {
     use super::*;
     use std::fs;
 
+    const RECORD: &str = "map.json";
+
     fn folder(dir: &Path) -> RunFolder {
-        RunFolder::open(dir, MAP_RECORD).unwrap()
+        RunFolder::open(dir, RECORD).unwrap()
     }
 
     fn publish(folder: &RunFolder, names: &[&str], text: &str) -> Result<()> {
@@ -326,7 +319,7 @@ mod tests {
 
     #[test]
     fn a_run_takes_the_place_of_the_one_before_and_nothing_else() {
-        for record in [Some(MAP_RECORD), None] {
+        for record in [Some(RECORD), None] {
             let dir = tempfile::tempdir().unwrap();
             let out = &dir.path().join("out");
             publish(&RunFolder::open(out, record).unwrap(), &["a.csv", "b.svg"], "first").unwrap();
@@ -344,13 +337,12 @@ mod tests {
         let list = r#"{"record":"map.json","files":[["a.csv","00"]],"is_complete":true}"#;
         let outside = list.replace("a.csv", "../a.csv");
         let record = r#"{"program":"lanesweep 0.2.0","files":["a.csv"]}"#;
-        for (name, text) in [("notes.txt", "mine"), (MAP_RECORD, record), (LIST, list), (LIST, "{}"), (LIST, &outside)]
-        {
+        for (name, text) in [("notes.txt", "mine"), (RECORD, record), (LIST, list), (LIST, "{}"), (LIST, &outside)] {
             let dir = tempfile::tempdir().unwrap();
             let out = dir.path();
             fs::write(out.join("a.csv"), "mine").unwrap();
             fs::write(out.join(name), text).unwrap();
-            let error = RunFolder::open(out, MAP_RECORD).unwrap_err();
+            let error = RunFolder::open(out, RECORD).unwrap_err();
             assert!(matches!(error, Error::Usage { .. }) && error.to_string().contains("a.csv"), "{name}: {error}");
             assert_eq!(fs::read_to_string(out.join("a.csv")).unwrap(), "mine");
             assert_eq!(fs::read_to_string(out.join(name)).unwrap(), text);
@@ -362,7 +354,7 @@ mod tests {
         fs::write(out.join("b.csv"), "mine").unwrap();
         assert!(publish(&folder(out), &["b.csv"], "second").unwrap_err().to_string().contains("b.csv"));
         fs::write(out.join("a.csv"), "mine").unwrap();
-        assert!(RunFolder::open(out, MAP_RECORD).unwrap_err().to_string().contains("a.csv was changed"));
+        assert!(RunFolder::open(out, RECORD).unwrap_err().to_string().contains("a.csv was changed"));
         assert_eq!(["a.csv", "b.csv"].map(|name| fs::read_to_string(out.join(name)).unwrap()), ["mine", "mine"]);
     }
 
@@ -379,7 +371,7 @@ mod tests {
         FileList { is_complete: false, ..list }.write(out).unwrap();
         // With its record it is complete.
         assert!(unfinished(out).is_none());
-        fs::remove_file(out.join(MAP_RECORD)).unwrap();
+        fs::remove_file(out.join(RECORD)).unwrap();
         assert!(unfinished(out).unwrap().contains(&"c.csv".to_owned()));
         publish(&folder(out), &["d.csv"], "third").unwrap();
         assert_eq!(names(out), ["d.csv", LIST, "map.json"]);
@@ -390,11 +382,11 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path().join("out");
         let held = folder(&out);
-        assert!(matches!(RunFolder::open(&out, STUDY_RECORD), Err(Error::Busy { .. })));
+        assert!(matches!(RunFolder::open(&out, "run.json"), Err(Error::Busy { .. })));
         assert!(matches!(RunFolder::share(&out), Err(Error::Busy { .. })));
         publish(&held, &["report.html"], "map").unwrap();
         drop(held);
-        for other in [Some(STUDY_RECORD), Some("index.csv"), None] {
+        for other in [Some("run.json"), Some("index.csv"), None] {
             let error = RunFolder::open(&out, other).unwrap_err();
             assert!(matches!(error, Error::Usage { .. }) && error.to_string().contains("map.json"), "{error}");
         }
@@ -421,7 +413,7 @@ mod tests {
         fs::write(&precious, "mine").unwrap();
         for name in [LOCK, LIST] {
             std::os::unix::fs::symlink(&precious, out.join(name)).unwrap();
-            let refused = RunFolder::open(&out, MAP_RECORD).unwrap_err();
+            let refused = RunFolder::open(&out, RECORD).unwrap_err();
             assert!(refused.to_string().contains("this is a link"), "{name}: {refused}");
             fs::remove_file(out.join(name)).unwrap();
         }

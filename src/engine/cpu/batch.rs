@@ -16,8 +16,7 @@ use crate::cpu::{LANES, ROWS};
 use crate::frame::Simulation;
 use crate::lane_step::{LaneConstants, LaneState, OtherState, advance};
 use lanesweep_model::driver::DriverModel;
-use lanesweep_model::scalar::Flag;
-use lanesweep_model::scalar::Real;
+use lanesweep_model::scalar::{Flag, Real};
 
 /// Batches of a burst.
 pub(crate) const BATCHES: usize = 3;

@@ -8,8 +8,7 @@ use std::time::Instant;
 
 use super::adapters::AdapterCard;
 use super::device::{Device, GpuOptions, PipelineSpec, Tampering};
-use super::generator::Inputs;
-use super::generator::{GeneratorSetup, generate};
+use super::generator::{GeneratorSetup, Inputs, generate};
 use super::records::StartRecord;
 use super::ring::{Answer, Flight, Job, RING, Slot};
 use crate::LaneCase;

@@ -133,7 +133,7 @@ impl CaseParameters {
     ///
     /// # Errors
     /// [`Error::Usage`] for a value outside the physical range, unless such values are accepted.
-    pub fn check_plausible(&self, doubts: &mut Doubts) -> Result<()> {
+    pub(crate) fn check_plausible(&self, doubts: &mut Doubts) -> Result<()> {
         for &CaseNumber { key, plausible, quantity, .. } in &NUMBERS {
             let (Some(plausible), Some(value)) = (plausible, self[quantity]) else { continue };
             doubts

@@ -6,8 +6,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use lanesweep_support::files::{remove_file, write_atomically};
-use lanesweep_support::input_file;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, input_file};
 
 /// Driven time and distance of the recordings that were searched for scenarios.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -79,7 +78,7 @@ impl DataProvenance {
     /// Path of the provenance file: `scenarios.jsonl` → `scenarios.exposure.json`. Other formats keep their ending, so
     /// that the same scenarios in two formats have one file each: `scenarios.parquet` →
     /// `scenarios.parquet.exposure.json`.
-    pub fn path_of(scenarios: &Path) -> PathBuf {
+    pub(crate) fn path_of(scenarios: &Path) -> PathBuf {
         match scenarios.extension().and_then(|ending| ending.to_str()) {
             Some(ending @ ("parquet" | "csv")) => scenarios.with_extension(format!("{ending}.exposure.json")),
             _ => scenarios.with_extension("exposure.json"),

@@ -255,7 +255,7 @@ pub(super) mod tests {
     use super::*;
 
     /// The words of the document's texts, lines joined; also checks that its tags nest.
-    pub fn words(svg: &str) -> String {
+    pub(crate) fn words(svg: &str) -> String {
         let (mut open, mut words) = (Vec::new(), Vec::new());
         for part in svg.split('<').skip(1).filter(|part| !part.starts_with("!--")) {
             let (tag, after) = part.split_once('>').expect("every tag ends");

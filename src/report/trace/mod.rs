@@ -7,8 +7,7 @@ mod lanes;
 mod panels;
 mod positions;
 
-use super::plot::number;
-use super::plot::{Anchor, Canvas, Ends, Figure, INK, Look, Plot, TICK, Type, set};
+use super::plot::{Anchor, Canvas, Ends, Figure, INK, Look, Plot, TICK, Type, number, set};
 pub use lanes::TraceReport;
 use lanesweep_engine::{StepMark, Trace, TracedStep};
 use lanesweep_support::table::Table;

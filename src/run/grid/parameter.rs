@@ -83,7 +83,7 @@ impl MapParameter {
     ///
     /// # Errors
     /// [`Error::Usage`] that names both.
-    pub fn refuse_repeats(given: &[&MapParameter]) -> Result<()> {
+    pub(crate) fn refuse_repeats(given: &[&MapParameter]) -> Result<()> {
         for (at, parameter) in given.iter().enumerate() {
             if let Some(before) = given[..at].iter().find(|p| p.quantity == parameter.quantity) {
                 let problem = format!("`{}` and `{}` say the same twice", before.key, parameter.key);
@@ -107,7 +107,7 @@ impl MapParameter {
     ///
     /// # Errors
     /// [`Error::Usage`] for a value beyond the physical range, unless such values are accepted.
-    pub fn check_plausible(&self, value: f64, doubts: &mut Doubts) -> Result<()> {
+    pub(crate) fn check_plausible(&self, value: f64, doubts: &mut Doubts) -> Result<()> {
         let Some(plausible) = self.quantity.number().plausible else { return Ok(()) };
         let si = match self.quantity {
             _ if self.is_relative => self.si(value).abs(),

@@ -5,9 +5,8 @@ use std::io::{BufRead, BufReader, ErrorKind, Read, Seek, Write};
 use std::path::Path;
 
 use lanesweep_support::files::write_inside;
-use lanesweep_support::input_file;
 use lanesweep_support::run_folder::RunFolder;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, input_file};
 
 /// File name of the plan in a run's folder.
 pub const PLAN_FILE: &str = "plan.json";

@@ -6,14 +6,13 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use crate::parts::{PLAN_FILE, RUN_PLAN_FILE, kind_of};
-use crate::sampling::{Estimator, SampleHeadways, SampleOptions, plan_samples};
-use crate::study::Study;
+use crate::sampling::{ESTIMATE_RECORD, Estimator, SampleHeadways, SampleOptions, plan_samples};
+use crate::study::{STUDY_RECORD, Study};
 use lanesweep_engine::{ENGINE_VERSION, Headway, LanePlan};
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::profile::Profile;
 use lanesweep_stats::density::{DensityModel, read_density};
 use lanesweep_support::input_file::{MAX_TABLE_BYTES, read_json};
-use lanesweep_support::run_folder::{ESTIMATE_RECORD, STUDY_RECORD};
 use lanesweep_support::{Error, Place, Result};
 
 /// Crude Monte Carlo of a folder: the plan, remade from the density beside the record, and the density.

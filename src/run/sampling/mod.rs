@@ -31,7 +31,7 @@ use plan_file::{KIND, SEARCH_FILE};
 pub use proposal_file::{proposal_from_text, proposal_text, read_proposal};
 pub use result::SampleResult;
 pub use sample_options::{Estimator, Question, SampleHeadways, SampleOptions};
-pub use sample_run::{CrudeJob, SampleJob, WeightedJob};
+pub use sample_run::{CrudeJob, ESTIMATE_RECORD, SampleJob, WeightedJob};
 pub use uncertainty::Uncertainty;
 pub use weighted::WeightedTally;
 

@@ -6,8 +6,7 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use lanesweep_stats::density::{DensityModel, MAX_FILE_BYTES, Mixture};
-use lanesweep_support::input_file;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, input_file};
 
 const VERSION: u64 = 1;
 

@@ -31,8 +31,7 @@ use lanesweep_engine::{Confusion, Headway, LanePlan, Partial, UnitCounts};
 use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::scenario::Category;
-use lanesweep_support::ranges;
-use lanesweep_support::{Error, Place, Result, settings};
+use lanesweep_support::{Error, Place, Result, ranges, settings};
 
 /// Ending of the name of a parameterization that replays each scenario by a basis that has not seen it.
 pub const CROSS_VALIDATED: &str = "-cv";

@@ -25,7 +25,7 @@ pub use provenance::{CategoryProvenance, ParameterHistogram, StudyProvenance};
 
 pub use reference::{Difference, ReferenceComparison};
 pub use robustness::robust_lanes;
-pub use run::StudyResult;
+pub use run::{STUDY_RECORD, StudyResult};
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};

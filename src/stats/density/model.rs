@@ -16,8 +16,7 @@ use super::valid::{VALID_FRACTION_DRAWS, ValidFraction};
 use lanesweep_model::scenario::parameterization::{
     Parameterization, ParameterizationOptions, Reduction, Sizes, SvdFit,
 };
-use lanesweep_model::scenario::{Category, Scenario};
-use lanesweep_model::scenario::{DataProvenance, Driven};
+use lanesweep_model::scenario::{Category, DataProvenance, Driven, Scenario};
 use lanesweep_support::{Error, Place, Result};
 
 /// Provenance of a density.

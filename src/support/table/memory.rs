@@ -6,8 +6,7 @@ use serde_json::{Map, Value};
 
 use super::writer::{append_csv, csv_header};
 use super::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter, writer};
-use crate::Result;
-use crate::readable;
+use crate::{Result, readable};
 
 /// Columns and rows; every row has one cell per column.
 #[derive(Debug, Clone, Default, PartialEq)]

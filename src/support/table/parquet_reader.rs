@@ -20,8 +20,7 @@ use parquet::basic::Compression;
 use serde_json::Value;
 
 use super::{Cell as TableCell, Row, TableRows};
-use crate::input_file;
-use crate::{Error, Place, Result};
+use crate::{Error, Place, Result, input_file};
 
 /// Rows decoded together, with and without lists; each may repeat a text of [`MAX_TEXT`].
 const BATCH_ROWS: [usize; 2] = [64, 256];

@@ -17,8 +17,7 @@ use crate::trajectory::generator::{GeneratorOptions, generate_one};
 use crate::trajectory::{FileChecksum, InputFile, Inputs, Loaded, Recording};
 use lanesweep_model::plausibility::Implausible;
 use lanesweep_model::scenario::{Category, Scenario, ScenarioFile, mined_id, usable};
-use lanesweep_support::readable;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, readable};
 
 /// Results of one recording.
 #[derive(Debug, Clone, Serialize, Deserialize)]

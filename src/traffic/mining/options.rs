@@ -5,8 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::trajectory::{EgoViewOptions, LIMIT_TOLERANCE_M};
-use lanesweep_support::ranges;
-use lanesweep_support::{Result, settings};
+use lanesweep_support::{Result, ranges, settings};
 
 settings! {
     /// All options of `mine`. Values above 10⁶ have no meaning in traffic, and their number of samples

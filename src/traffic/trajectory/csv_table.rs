@@ -13,10 +13,9 @@ use csv::{ByteRecord, Reader, ReaderBuilder, Terminator};
 use sha2::{Digest, Sha256};
 
 use super::number;
-use lanesweep_support::input_file;
 use lanesweep_support::plain_text::nearest;
 use lanesweep_support::table::{delimiter_of, has_decimal_commas};
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, input_file};
 
 /// Identity of a file's content in the run record.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]

@@ -4,8 +4,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use lanesweep_support::ranges;
-use lanesweep_support::{Result, settings};
+use lanesweep_support::{Result, ranges, settings};
 
 settings! {
     /// Options of the generator. `lanesweep study` without data uses the default.

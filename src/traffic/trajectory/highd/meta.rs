@@ -5,8 +5,7 @@ use super::format::{FRAME_RATES_HZ, LANE_LINES_LIMIT, RECORDING_META_HEADER, TRA
 use super::frame::{Direction, LaneNumbers};
 use super::inventory::HighdFiles;
 use crate::trajectory::csv_table::{CsvColumn, CsvTable, FileChecksum, quoted};
-use crate::trajectory::number;
-use crate::trajectory::{Carriageway, VehicleClass};
+use crate::trajectory::{Carriageway, VehicleClass, number};
 use lanesweep_model::plausibility::{Doubts, HELP, Quantity};
 use lanesweep_support::{Error, Place, Result};
 
