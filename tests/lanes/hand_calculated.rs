@@ -287,7 +287,7 @@ fn lane_intrusion_follows_from_the_width_of_lane_and_cutter() {
     for (case, visible_s) in [
         (PlainCase { width_m: 2.5, ..plain }, 0.8),
         (PlainCase { ego_width_m: 2.5, ..plain }, 1.1),
-        (PlainCase { lane_width_m: 3.0, ..plain }, 0.85),
+        (PlainCase { lane_width_m: 3.0, lateral_distance_m: 3.0, ..plain }, 0.85),
     ] {
         near(reading(&un_r157(&case, Headway::GapM(15.0)), "(b)").value.unwrap(), visible_s, 1e-6);
     }
