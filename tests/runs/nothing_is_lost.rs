@@ -1,5 +1,4 @@
-//! What a run must never do to its user's files. What a folder of results keeps, replaces and refuses is tested in
-//! `support/run_folder.rs`, locks in `support/lock.rs`.
+//! What a run must never do to its user's files. Locks are in `mechanisms.rs`.
 
 use crate::common::program::{json, names, ran, refused};
 use crate::common::{self, program};
@@ -81,7 +80,7 @@ fn a_foreign_index_of_exported_scenarios_and_a_file_of_their_name_stay() {
     }
 }
 
-/// Of each way of writing, a file; the others are in `support/run_folder.rs`.
+/// Of each way of writing, a file.
 #[cfg(unix)]
 #[test]
 fn a_folder_from_somebody_else_makes_no_run_write_elsewhere() {
