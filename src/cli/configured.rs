@@ -500,31 +500,3 @@ impl Configured {
         OpenBackend::open_to_verify(backend, device.as_ref())
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_flag_that_sets_a_key_is_of_a_verb_and_has_the_keys_default_and_words() {
-        let keys = Key::all();
-        let find = |verb: &str| -> Option<Command> {
-            let command = command();
-            let inner = command.get_subcommands().flat_map(|verb| std::iter::once(verb).chain(verb.get_subcommands()));
-            std::iter::once(&command).chain(inner).find(|command| command.get_name() == verb).cloned()
-        };
-        for (name, id, .., verbs) in FLAGS {
-            let key = Key::find(&keys, name).unwrap_or_else(|| panic!("{name}"));
-            for verb in verbs {
-                let verb = find(verb).unwrap_or_else(|| panic!("{verb}"));
-                let arg = verb.get_arguments().find(|arg| arg.get_id() == id).unwrap_or_else(|| panic!("{id}"));
-                assert!(arg.get_help().is_some_and(|help| help.to_string().len() > 4), "{name}");
-                let Some(default) = &key.default else { continue };
-                let [written] = arg.get_default_values() else { panic!("{name}") };
-                let mut layers = Layers::defaults();
-                layers.flag(name, id, Value::Text(written.clone().into())).unwrap();
-                assert_eq!(layers.get(name).unwrap().value, Some(default), "{name}");
-            }
-        }
-    }
-}

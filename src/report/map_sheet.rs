@@ -167,23 +167,3 @@ impl MapSheet<'_> {
         values.map(|(at, value)| self.value_name(at, *value)).collect::<Vec<_>>().join(", ")
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Lightness of a colour, 0 to 100 (CIE L*).
-    fn lightness(colour: &str) -> f64 {
-        let linear = |at: usize| (f64::from(u8::from_str_radix(&colour[at..at + 2], 16).unwrap()) / 255.0).powf(2.2);
-        let luminance = 0.2126 * linear(1) + 0.7152 * linear(3) + 0.0722 * linear(5);
-        116.0 * luminance.cbrt() - 16.0
-    }
-
-    #[test]
-    fn in_a_grey_print_the_kinds_of_a_sheet_are_told_apart() {
-        let mut kinds = CellOutcome::ALL.map(colour);
-        kinds.sort_by(|a, b| lightness(a).total_cmp(&lightness(b)));
-        let steps = kinds.windows(2).map(|pair| lightness(pair[1]) - lightness(pair[0]));
-        assert!(steps.clone().all(|step| step > 9.0), "{kinds:?} {:?}", steps.collect::<Vec<_>>());
-    }
-}

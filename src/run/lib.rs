@@ -8,8 +8,6 @@ pub mod cases;
 pub mod check;
 pub mod grid;
 pub mod parts;
-#[cfg(test)]
-mod pinned_lanes;
 pub mod reopen;
 pub mod sampling;
 pub mod score;

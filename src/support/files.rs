@@ -116,22 +116,3 @@ pub fn files_of(folder: &Path) -> Result<Vec<PathBuf>> {
     files.sort();
     Ok(files)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_failed_write_leaves_the_old_file_and_nothing_else() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("result.csv");
-        write_atomically(&path, b"old").unwrap();
-        let error = write_inside(&path, |file| {
-            file.write_all(b"half")?;
-            Err(std::io::Error::other("disk gone"))
-        });
-        assert!(error.is_err());
-        assert_eq!(std::fs::read(&path).unwrap(), b"old");
-        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
-    }
-}

@@ -10,7 +10,7 @@ use lanesweep::traffic::trajectory::tracks::{self, Preset, TrackFile};
 use lanesweep::traffic::trajectory::{InputFile, Inputs, Recording};
 
 use crate::common::exid::Plain;
-use crate::tracks::generated;
+use crate::traffic::tracks::generated;
 
 fn table() -> Plain {
     Plain::of(&generated(), 5)
@@ -143,7 +143,7 @@ fn what_a_time_without_a_unit_is_taken_for_is_said() {
     let generic = Preset::load("generic").unwrap();
     let read = tracks::read_tracks(&TrackFile { path, id: "own".to_owned() }, &generic).unwrap();
     let about = &read[0].understanding;
-    assert!(crate::tracks::fact(about, "columns").contains("time = t (ms since 1970)"), "{:?}", about.facts);
+    assert!(crate::traffic::tracks::fact(about, "columns").contains("time = t (ms since 1970)"), "{:?}", about.facts);
 }
 
 #[test]
@@ -154,32 +154,6 @@ fn times_of_day_that_pass_midnight_are_refused() {
     };
     let error = read("own.csv", with_times(evening).text().as_bytes()).unwrap_err().to_string();
     assert!(error.contains("midnight") && error.contains("line "), "{error}");
-}
-
-#[test]
-fn positions_in_millimetres_are_read_by_a_preset() {
-    let dir = tempfile::tempdir().unwrap();
-    let (path, preset) = (dir.path().join("own.csv"), dir.path().join("own.toml"));
-    let mut in_mm = table();
-    for (column, name) in [("x", "x_mm"), ("y", "y_mm")] {
-        in_mm.map(column, |metres, _| 1000.0 * metres);
-        let at = in_mm.at(column);
-        in_mm.header[at] = name.to_owned();
-    }
-    fs::write(&path, in_mm.text()).unwrap();
-    let sizes = "length = \"length\"\nwidth = \"width\"\nclass = \"class\"\nheading = \"heading\"\nx_speed = \"vx\"\ny_speed = \"vy\"";
-    let columns = "x = { name = \"x_mm\", unit = \"mm\" }\ny = { name = \"y_mm\", unit = \"mm\" }";
-    let own = format!(
-        "name = \"own\"\n[classes]\ntruck = [\"truck\"]\n[columns]\nvehicle = \"track_id\"\ntime = \"t\"\n{columns}\n{sizes}\n"
-    );
-    fs::write(&preset, own).unwrap();
-    let preset = Preset::load(&preset.to_string_lossy()).unwrap();
-    let found = InputFile::Tracks(TrackFile { path, id: "own".to_owned() }, Box::new(preset))
-        .read(Implausible::Refused)
-        .unwrap();
-    let right = read("own.csv", table().text().as_bytes()).unwrap();
-    let pairs = found[0].recording.tracks.iter().zip(&right.tracks);
-    assert!(pairs.flat_map(|(a, b)| a.s_m.iter().zip(&b.s_m)).all(|(a, b)| (a - b).abs() < 1e-9));
 }
 
 #[test]

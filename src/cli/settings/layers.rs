@@ -244,37 +244,3 @@ fn insert(table: &mut Map<String, Value>, name: &str, value: Value) {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_the_checks_let_pass_the_types_take() {
-        let words = [
-            "0",
-            "1",
-            "-1",
-            "0.5",
-            "1e300",
-            "1e-300",
-            "NaN",
-            "inf",
-            "true",
-            "[]",
-            "4294967295",
-            "4294967296",
-            "9007199254740993",
-            "18446744073709551615",
-            "18446744073709551616",
-        ];
-        for key in keys_in_order() {
-            for word in words {
-                let mut layers = Layers::defaults();
-                if layers.assign(&format!("{}={word}", key.name)).is_ok() {
-                    assert!(layers.settings().is_ok(), "{} = {word}: {:?}", key.name, layers.settings().err());
-                }
-            }
-        }
-    }
-}

@@ -174,6 +174,3 @@ pub fn table(traces: &[(String, &Trace)]) -> Table {
 
 /// A step of a named trace.
 type Row<'a> = (&'a String, &'a Trace, &'a TracedStep);
-
-#[cfg(test)]
-mod trace_tests;

@@ -246,27 +246,3 @@ impl Risk {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use lanesweep_model::scenario::Driven;
-    use lanesweep_stats::estimate::{BinomialInterval, Counts, StopReason, from_counts};
-
-    #[test]
-    fn risk_without_failures_is_bounded_and_not_zero() {
-        let exposure = Exposure::new(100, Driven { hours: Some(50.0), kilometres: Some(5000.0) });
-        let counts = |failures| Counts { runs: 10_000, failures, voids: 0, tries: 10_000 };
-        let of = |failures| {
-            let estimate = from_counts(&counts(failures), BinomialInterval::Wilson, 0.95, StopReason::Samples);
-            Risk::of(&estimate, Some(&exposure)).per_hour.unwrap()
-        };
-        let none = of(0);
-        assert!(none.estimate == 0.0 && none.high > 2.0 * 2.9e-4 && none.high < 3.0 * 3.0e-4);
-        let some = of(100);
-        // 10 % error of the events and 10 % of the failures.
-        assert!((some.estimate - 0.02).abs() < 1e-12);
-        assert!((some.standard_deviation / some.estimate - 0.141).abs() < 2e-3);
-        assert!(some.low < some.estimate && some.high > some.estimate);
-    }
-}

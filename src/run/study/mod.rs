@@ -19,7 +19,7 @@ pub(crate) use cases::WINDOW;
 pub use evaluation::{CategoryNumbers, StudyEvaluation};
 pub use external_replays::ExternalReplay;
 pub use plan::{StudyOptions, outline_study, plan_study};
-pub use plan_file::StudyHead;
+pub use plan_file::{StudyHead, plan_of_parts};
 use provenance::category_provenance;
 pub use provenance::{CategoryProvenance, ParameterHistogram, StudyProvenance};
 

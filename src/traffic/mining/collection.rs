@@ -333,26 +333,3 @@ fn driven(recording: &Recording, options: &MiningOptions) -> [f64; 2] {
     }
     sum
 }
-
-#[cfg(test)]
-mod tests {
-    use std::sync::atomic::{AtomicBool, Ordering};
-
-    use super::*;
-
-    #[test]
-    fn a_file_of_any_size_is_read_and_others_wait_for_it() {
-        let (turns, has_begun) = (Turns::default(), AtomicBool::new(false));
-        let first = turns.of_bytes(u64::MAX);
-        std::thread::scope(|threads| {
-            threads.spawn(|| {
-                let _second = turns.of_bytes(1);
-                has_begun.store(true, Ordering::SeqCst);
-            });
-            std::thread::sleep(std::time::Duration::from_millis(20));
-            assert!(!has_begun.load(Ordering::SeqCst));
-            drop(first);
-        });
-        assert!(has_begun.load(Ordering::SeqCst));
-    }
-}

@@ -319,14 +319,3 @@ fn bad(place: Place, found: &str, expected: &str) -> Error {
     let shown: String = found.chars().take(40).flat_map(char::escape_debug).collect();
     Error::input(place, format!("`{shown}` is not {expected}"), "correct the value, or name it in `none` of the preset")
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_are_compared_without_case_and_marks() {
-        assert!(letters("Vehicle-ID") == letters("vehicle_id") && letters("xloc_kf") == letters("XLoc KF"));
-        assert!(letters("vehicle_idx") != letters("vehicle_id"));
-    }
-}

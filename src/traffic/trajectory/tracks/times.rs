@@ -62,18 +62,3 @@ fn seconds_of_date(text: &str) -> Option<f64> {
     let of_day = 3600.0 * hours + 60.0 * minutes + seconds - offset_s;
     of_day.is_finite().then_some(days as f64 * 86_400.0 + of_day)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn dates_become_seconds() {
-        assert_eq!(seconds_of_date("1970-01-01T00:00:00Z"), Some(0.0));
-        assert_eq!(seconds_of_date("2024-10-07 06:00:00.5+00:00"), Some(1_728_280_800.5));
-        assert_eq!(seconds_of_date("2024-10-07 08:00:00.5+02:00"), Some(1_728_280_800.5));
-        for wrong in ["2024-10-07", "2024-13-07 06:00:00", "x", "2024-10-07 06", "2024-10-07 a:b:c", "-"] {
-            assert_eq!(seconds_of_date(wrong), None, "{wrong}");
-        }
-    }
-}

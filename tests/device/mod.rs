@@ -1,9 +1,6 @@
 //! Lanes on a device. Without one the tests say so and pass; `LANESWEEP_REQUIRE_DEVICE=1` makes that a failure.
 //! Programs without the feature `gpu` have only the test that they say so.
 
-#[path = "../common/mod.rs"]
-mod common;
-
 #[cfg(feature = "gpu")]
 mod counting;
 #[cfg(feature = "gpu")]

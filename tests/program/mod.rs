@@ -1,8 +1,5 @@
 //! The program as its users meet it, the book, and the repository itself.
 
-#[path = "../common/mod.rs"]
-mod common;
-
 mod adding_a_model;
 mod book;
 mod check;
@@ -15,6 +12,5 @@ mod help_examples;
 mod messages;
 mod report_page;
 mod report_width;
-mod rooms;
 mod shell;
 mod source_rules;

@@ -1,8 +1,5 @@
 //! Recordings and mining: what is read, what is refused, which scenarios are found.
 
-#[path = "../common/mod.rs"]
-mod common;
-
 mod bad_geometry;
 mod bad_recordings;
 mod field_reports;

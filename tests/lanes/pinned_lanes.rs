@@ -2,21 +2,18 @@
 
 use sha2::{Digest, Sha256};
 
-use super::sampling::{SAMPLE_PURPOSE, generator_of};
-use super::study::plan_file::{BlockHead, StudyHead, stripped};
-use lanesweep_engine::verify::{SetOptions, random_plan, threshold_plan};
-use lanesweep_engine::{
-    Backend, Constants, CpuBackend, ENGINE_VERSION, Headway, LanePlan, Outcome, Silent, Start, Wanted, words,
-};
-use lanesweep_model::driver::ModelId;
-use lanesweep_model::profile::Profile;
-use lanesweep_model::scenario::parameterization::{
-    Parameterization, ParameterizationOptions, Reduction, Sizes, SvdBasis,
-};
-use lanesweep_model::scenario::{Category, Scenario, Tables};
-use lanesweep_random::Stream;
-use lanesweep_stats::density::{Bandwidth, BandwidthRule, Kde, ParameterSpace, SearchEnd};
-use lanesweep_support::plain_text::hex;
+use lanesweep::engine::ENGINE_VERSION;
+use lanesweep::engine::verify::{SetOptions, random_plan, threshold_plan};
+use lanesweep::engine::{Backend, Constants, CpuBackend, Headway, LanePlan, Outcome, Silent, Start, Wanted, words};
+use lanesweep::model::driver::ModelId;
+use lanesweep::model::profile::Profile;
+use lanesweep::run::sampling::{SAMPLE_PURPOSE, generator_of};
+use lanesweep::run::study::plan_of_parts;
+use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions, Reduction, Sizes, SvdBasis};
+use lanesweep::scenario::{Category, Scenario, Tables};
+use lanesweep::stats::density::{Bandwidth, BandwidthRule, Kde, ParameterSpace, SearchEnd};
+use lanesweep::stats::random::Stream;
+use lanesweep::support::plain_text::hex;
 
 /// A version, and the SHA-256 of a small set of lanes computed with it: of the words up to [`MEASURES`], and of the
 /// others, which were added later. A test uses them to detect that [`ENGINE_VERSION`] must be raised.
@@ -84,14 +81,10 @@ fn reduction(category: Category, options: &ParameterizationOptions) -> Reduction
 /// Two scenarios of every category with every parameterization.
 fn study(profile: &Profile) -> LanePlan {
     let options = ParameterizationOptions::default();
-    let (mut held, mut blocks) = (Vec::new(), Vec::new());
-    for category in Category::ALL {
-        held.extend((0..2).map(|number| stripped(&scenario(category, number), None)));
-        blocks.push(BlockHead::new(category, 2, Some(&reduction(category, &options)), Vec::new()));
-    }
+    let held: Vec<Scenario> = Category::ALL.iter().flat_map(|of| (0..2).map(|number| scenario(*of, number))).collect();
+    let reductions = Category::ALL.map(|of| (of, reduction(of, &options)));
     let headways = vec![Headway::ThwS(1.2), Headway::ThwS(0.4), Headway::GapM(9.0)];
-    let head = StudyHead::new(profile.clone(), models(), headways, options, blocks, &held).unwrap();
-    head.with_scenarios(0, held).unwrap().window(0..6).unwrap()
+    plan_of_parts((profile.clone(), models(), headways), options, &reductions, &held).unwrap()
 }
 
 fn lanes(digests: &mut [Sha256; 2], plan: &LanePlan) -> usize {

@@ -1,8 +1,5 @@
 //! Densities and estimators.
 
-#[path = "../common/mod.rs"]
-mod common;
-
 mod claim_coverage;
 mod density;
 mod drawn_scenarios;
@@ -10,3 +7,4 @@ mod estimator_coverage;
 mod estimators;
 mod estimators_on_lanes;
 mod fit;
+mod random;

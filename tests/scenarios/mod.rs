@@ -1,8 +1,5 @@
 //! Scenario files, tables of users, parameterizations, OpenSCENARIO.
 
-#[path = "../common/mod.rs"]
-mod common;
-
 mod openscenario;
 mod printed_json;
 mod reduction_goldens;
