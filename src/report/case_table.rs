@@ -13,7 +13,7 @@ use super::tables::wrap;
 use lanesweep_engine::Trace;
 use lanesweep_model::driver::ModelId;
 use lanesweep_run::check::{Answer, CaseVerdicts, Demand, Judged, Judgement, RunEnd, Verdict};
-use lanesweep_support::Result;
+use lanesweep_support::{Result, option};
 use lanesweep_support::readable::counted;
 use lanesweep_support::table::{Cell, Column, ColumnKind, Table, TableMetadata, TableOf};
 
@@ -248,7 +248,7 @@ impl CaseAnswers {
     fn left_out(&self) -> String {
         match self.cases.len().saturating_sub(MAX_ROWS) {
             0 => String::new(),
-            left => format!("The worst {MAX_ROWS} rows; {left} more are in the table of option `rows`."),
+            left => format!("The worst {MAX_ROWS} rows; {left} more are in the table of {}.", option("rows")),
         }
     }
 

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use crate::atomic_file::folder_of;
 use crate::atomic_file::{Live, is_named, refuse_link};
-use crate::{Error, Place, Result};
+use crate::{Error, Place, Result, option};
 
 /// Maximum length of a lock file, bytes: a process id and an end of line are shorter.
 const MAX_LOCK_BYTES: u64 = 32;
@@ -107,7 +107,7 @@ fn refuse_foreign(path: &Path, file: &mut File) -> Result<()> {
     file.take(MAX_LOCK_BYTES + 1).read_to_end(&mut text).map_err(|source| Error::io(path, "read", source))?;
     if text.len() as u64 > MAX_LOCK_BYTES || !text.trim_ascii().iter().all(u8::is_ascii_digit) {
         let problem = "it would be overwritten, and it is no lock file of lanesweep";
-        return Err(Error::usage(Place::file(path), problem, "move it away, or give another option `out`"));
+        return Err(Error::usage(Place::file(path), problem, format!("move it away, or give another {}", option("out"))));
     }
     Ok(())
 }

@@ -71,7 +71,8 @@ pub const LIMITS: [Limits; 10] = [
 pub const NOISE_MPS: f64 = -0.5;
 
 /// What a user can do about a refused value.
-pub const HELP: &str = "correct the value or its unit; option `accept_implausible` uses it as it is";
+pub static HELP: LazyLock<String> =
+    LazyLock::new(|| format!("correct the value or its unit; {} uses it as it is", option("accept_implausible")));
 
 /// Policy for values outside the physical range.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

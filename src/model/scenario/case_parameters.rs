@@ -6,7 +6,7 @@ use super::{Category, LANE_WIDTH_M, PlainCase, check_headway, missing_parameter}
 use crate::profile::FrameProfile;
 use lanesweep_support::plausibility::{Doubts, HELP, Quantity};
 use lanesweep_support::table::{NameUnit, Resolved, resolve};
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Shortest and longest duration, s: the longest is the time cap of the paper's profile.
 pub(super) const DURATIONS_S: (f64, f64) = (0.1, 120.0);
@@ -145,7 +145,7 @@ impl CaseParameters {
             let (Some(quantity), Some(value)) = (*plausible, get(self)) else { continue };
             doubts
                 .check(quantity, value, || (*key).to_owned())
-                .map_err(|problem| Error::usage(Place::item(*key), problem, HELP))?;
+                .map_err(|problem| Error::usage(Place::item(*key), problem, HELP.as_str()))?;
         }
         Ok(())
     }
@@ -165,7 +165,7 @@ impl CaseParameters {
             doubts.check(Quantity::Speed, last_mps, || "the speed that results from the acceleration".to_owned());
         is_plausible.map_err(|text| {
             let problem = format!("it results in a speed that no vehicle has: {text}");
-            let help = "a deceleration is negative; an acceleration needs an end: option `end_speed`";
+            let help = format!("a deceleration is negative; an acceleration needs an end: {}", option("end_speed"));
             Error::usage(Place::item("acceleration"), problem, help)
         })?;
         Ok(plain)
@@ -278,7 +278,7 @@ fn missing(key: &str) -> Error {
         "lateral_speed" => "a speed in m/s",
         _ => "a speed with its unit, such as 60km/h,",
     };
-    let help = format!("give {what} with option `{key}` or as `{key}` in the file");
+    let help = format!("give {what} with {} or as `{key}` in the file", option(key));
     Error::usage(Place::item(key), "it is missing", help)
 }
 

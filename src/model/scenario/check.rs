@@ -152,7 +152,7 @@ pub(super) fn admit(
     let s = &*scenario;
     let mut check_plausible = |quantity, field: &str, value, words: &dyn Fn(String) -> String| {
         let judged = doubts.check(quantity, value, || place(field));
-        judged.map_err(|text| Problem { field: field.to_owned(), problem: words(text), help: HELP })
+        judged.map_err(|text| Problem { field: field.to_owned(), problem: words(text), help: HELP.as_str() })
     };
     let is = |text: String| text;
     check_plausible(Quantity::Rate, "fps", s.fps, &is)?;
