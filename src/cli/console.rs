@@ -50,6 +50,11 @@ pub(super) fn captured() -> MutexGuard<'static, Option<Captured>> {
     CAPTURED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// Whether a program has called a verb as a function.
+pub(super) fn is_captured() -> bool {
+    captured().is_some()
+}
+
 /// Adds a line to what is captured; false if the program prints.
 fn capture(level: Level, line: &str) -> bool {
     let mut captured = captured();
@@ -96,7 +101,7 @@ pub(super) fn start_log(verbosity: Verbosity) {
     let _ = tracing_subscriber::fmt()
         .with_writer(Log)
         // The owner of what is captured gets the level beside the line.
-        .with_level(captured().is_none())
+        .with_level(!is_captured())
         // If stderr is closed or full, no message can be shown, and writing one would panic.
         .log_internal_errors(false)
         // A message is one line, whatever characters a file name has.
@@ -293,7 +298,7 @@ fn unbroken(text: &str) -> String {
 
 /// Prints an error with its help on stderr.
 pub(super) fn complain(error: &Error) {
-    if captured().is_some() {
+    if is_captured() {
         // In the words of the library.
         capture(Level::ERROR, &format!("{error}; {}", error.help().unwrap_or_default()));
         return;

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::console::{self, Total};
 use super::format::FormatFlag;
@@ -57,11 +56,6 @@ pub(super) struct Fit {
     #[command(flatten)]
     format: FormatFlag,
 }
-
-from_arguments!(
-    Fit { out, with_thw, without_scenarios }
-    groups { data, categories, parameterizations, exposure, format }
-);
 
 impl Fit {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {

@@ -5,7 +5,6 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::console::Total;
 use super::format::FormatFlag;
@@ -70,11 +69,6 @@ pub(super) struct Map {
     #[arg(long, value_name = "DIR", default_value = "lanesweep-map", help_heading = "Output")]
     out: PathBuf,
 }
-
-from_arguments!(
-    Map { category, preset, x, y, panel, set, robust, out }
-    groups { models, criterion, plausibility, format }
-);
 
 const EXAMPLES: &str = "Examples (--help has the parameters and more):\n  \
                         lanesweep map cut-in --preset jrc --out maps\n  \

@@ -5,7 +5,6 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::console::{self, Total};
 use super::format::FormatFlag;
@@ -77,10 +76,6 @@ pub(super) struct Study {
     shards: ShardFlags,
 }
 
-from_arguments!(
-    Study { out, rows, published, cross_validate, external }
-    groups { data, categories, models, headways, format, shards }
-);
 impl Study {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         self.guard_inputs(configured)?;

@@ -4,6 +4,10 @@
 //! A value outside the plausible range is used and reported. One outside the physical range is refused, unless the user
 //! accepts implausible input; then it is reported too. Readers themselves refuse values that no arithmetic can hold.
 
+use std::sync::LazyLock;
+
+use lanesweep_support::option;
+
 /// Quantity of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs)] // the table below
@@ -71,7 +75,8 @@ pub const LIMITS: [Limits; 10] = [
 pub const NOISE_MPS: f64 = -0.5;
 
 /// What a user can do about a refused value.
-pub const HELP: &str = "correct the value or its unit; option `accept_implausible` uses it as it is";
+pub static HELP: LazyLock<String> =
+    LazyLock::new(|| format!("correct the value or its unit; {} uses it as it is", option("accept_implausible")));
 
 /// Policy for values outside the physical range.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

@@ -12,9 +12,9 @@ use super::tables::wrap;
 use lanesweep_engine::Trace;
 use lanesweep_model::driver::ModelId;
 use lanesweep_run::check::{Answer, CaseVerdicts, Demand, Judged, Judgement, RunEnd, Verdict};
-use lanesweep_support::Result;
 use lanesweep_support::readable::counted;
 use lanesweep_support::table::{Cell, Column, ColumnKind, Table, TableMetadata, TableOf};
+use lanesweep_support::{Result, option};
 
 /// All verdicts, the worst first: those without a driver of Annex 3 that avoids the collision, then those with one, then
 /// those without a collision.
@@ -247,7 +247,7 @@ impl CaseAnswers {
     fn left_out(&self) -> String {
         match self.cases.len().saturating_sub(MAX_ROWS) {
             0 => String::new(),
-            left => format!("The worst {MAX_ROWS} rows; {left} more are in the table of option `rows`."),
+            left => format!("The worst {MAX_ROWS} rows; {left} more are in the table of {}.", option("rows")),
         }
     }
 

@@ -13,7 +13,7 @@ use lanesweep_run::study::{Study, robust_lanes};
 use lanesweep_stats::density::DensityModel;
 use lanesweep_support::files::make_folder_of;
 use lanesweep_support::table::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter, json_value};
-use lanesweep_support::{Error, Result};
+use lanesweep_support::{Error, Result, option};
 
 /// A table for the lanes of a study; see [`write_study_chunk`]. It is written chunk by chunk, so that memory does not
 /// grow with the lanes.
@@ -43,7 +43,7 @@ pub fn sampled_table(path: &Path, sample: &Sample) -> Result<TableWriter> {
 /// # Errors
 /// [`Error::Usage`] for an unknown ending of the name.
 pub fn table_format(path: &Path) -> Result<TableFormat> {
-    TableFormat::of(path, &TableFormat::EVERY, "option `rows`")
+    TableFormat::of(path, &TableFormat::EVERY, &option("rows"))
 }
 
 fn create(

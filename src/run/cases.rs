@@ -10,7 +10,7 @@ use lanesweep_model::driver::ModelId;
 use lanesweep_model::plausibility::{Doubts, Implausible};
 use lanesweep_model::profile::Profile;
 use lanesweep_model::scenario::{CaseParameters, CaseQuantity, Category, Tables};
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Name of the only variant.
 const VARIANT: &str = "case";
@@ -152,10 +152,10 @@ fn encode(
         (Some(_), false) => {
             let key = if gap_m.is_some() { "gap" } else { "thw" };
             let problem = "the case has its own start, and headways are given for all cases";
-            return Err(Error::usage(Place::item(key), problem, "leave out the column or option `thw`"));
+            return Err(Error::usage(Place::item(key), problem, format!("leave out the column or {}", option("thw"))));
         }
         (None, true) => {
-            let help = "give a column `gap` (m) or `thw` (s), or option `thw` for all cases";
+            let help = format!("give a column `gap` (m) or `thw` (s), or {} for all cases", option("thw"));
             return Err(Error::usage(Place::item("gap"), "the initial distance is missing", help));
         }
     }

@@ -53,7 +53,7 @@ pub fn merge(dir: &Path, again: &dyn Fn(&str, Shard) -> String) -> Result<(RunFo
             Ok((folder, Merged::Sample(Box::new(merged))))
         }
         other => {
-            let help = "give the folder (option `out`) of a run in parts";
+            let help = format!("give the folder ({}) of a run in parts", lanesweep_support::option("out"));
             Err(Error::input(Place::file(plan), format!("this is a `{other}`, not the plan of a run"), help))
         }
     }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::atomic_file::{AtomicFile, folder_of};
 use crate::input_file::claim_output;
-use crate::{Error, Place, Result};
+use crate::{Error, Place, Result, option};
 
 /// Checks that a folder exists or could be created; it only inspects names, before the work starts.
 ///
@@ -44,7 +44,7 @@ pub fn remove_file(path: &Path) -> Result<()> {
 /// [`Error::Input`] for a file.
 pub fn check_run_folder(dir: &Path) -> Result<()> {
     if dir.is_file() {
-        let help = "give the folder (option `out`) that the run was written to";
+        let help = format!("give the folder ({}) that the run was written to", option("out"));
         return Err(Error::input(Place::file(dir), "this is a file; expected the folder of a run", help));
     }
     Ok(())

@@ -6,7 +6,7 @@ use std::io::{ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
 use crate::atomic_file::{Live, folder_of, is_named, refuse_link};
-use crate::{Error, Place, Result};
+use crate::{Error, Place, Result, option};
 
 /// Maximum length of a lock file, bytes: a process id and an end of line are shorter.
 const MAX_LOCK_BYTES: u64 = 32;
@@ -106,7 +106,11 @@ fn refuse_foreign(path: &Path, file: &mut File) -> Result<()> {
     file.take(MAX_LOCK_BYTES + 1).read_to_end(&mut text).map_err(|source| Error::io(path, "read", source))?;
     if text.len() as u64 > MAX_LOCK_BYTES || !text.trim_ascii().iter().all(u8::is_ascii_digit) {
         let problem = "it would be overwritten, and it is no lock file of lanesweep";
-        return Err(Error::usage(Place::file(path), problem, "move it away, or give another option `out`"));
+        return Err(Error::usage(
+            Place::file(path),
+            problem,
+            format!("move it away, or give another {}", option("out")),
+        ));
     }
     Ok(())
 }

@@ -6,7 +6,6 @@ use serde_json::{Number, Value};
 use toml::de::DeValue;
 
 use super::schema::settings_schema;
-use crate::arguments::Value as Given;
 use lanesweep_support::plain_text;
 use lanesweep_support::ranges::Range;
 use lanesweep_support::{Error, Place, Result};
@@ -161,22 +160,6 @@ pub(super) fn from_word(key: &Key, word: &str, place: Place) -> Result<Value> {
         },
     };
     value.and_then(|value| fitted(key, value)).ok_or_else(|| refused(key, &format!("`{word}`"), place))
-}
-
-/// Converts an argument's value to a value of a key.
-///
-/// # Errors
-/// As [`from_toml`].
-pub(super) fn from_value(key: &Key, given: &Given, place: Place) -> Result<Value> {
-    let value = match (&key.kind, given) {
-        (_, Given::Boolean(is_so)) => Some(Value::Bool(*is_so)),
-        // A number is a name too: the device 0.
-        (KeyKind::Text, _) => given.text().ok().map(Value::String),
-        (_, Given::Whole(n)) => whole(*n),
-        (_, Given::Number(x)) => Number::from_f64(*x).map(Value::Number),
-        _ => None,
-    };
-    value.and_then(|value| fitted(key, value)).ok_or_else(|| refused(key, &format!("`{given}`"), place))
 }
 
 /// Formats a value as TOML.

@@ -7,9 +7,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value};
 
-use super::keys::{Key, KeyKind, from_value, from_word, keys_in_order};
+use super::keys::{Key, KeyKind, from_word, keys_in_order};
 use super::{Settings, file};
-use crate::arguments::Value as Given;
 use lanesweep_support::{Error, Place, Result};
 
 /// Source of a value; a later one overrides an earlier one.
@@ -166,20 +165,11 @@ impl Layers {
     ///
     /// # Errors
     /// [`Error::Usage`] for an invalid value.
-    pub(crate) fn flag(&mut self, name: &str, flag: &str, value: Given) -> Result<()> {
+    pub(crate) fn flag(&mut self, name: &str, flag: &str, word: &str) -> Result<()> {
         let Some(key) = Key::find(&self.keys, name).cloned() else { return Ok(()) };
-        let origin = Origin::Flag(flag.to_owned());
-        match value {
-            Given::Text(word) if matches!(key.kind, KeyKind::Choice(_)) => {
-                self.set_word(&key, &word.to_string_lossy().to_ascii_lowercase(), origin)
-            }
-            Given::Text(word) => self.set_word(&key, &word.to_string_lossy(), origin),
-            value => {
-                let value = from_value(&key, &value, origin.place(&key.name))?;
-                self.set(&key.name, value, origin);
-                Ok(())
-            }
-        }
+        let is_choice = matches!(key.kind, KeyKind::Choice(_));
+        let word = if is_choice { &*word.to_ascii_lowercase() } else { word };
+        self.set_word(&key, word, Origin::Flag(flag.to_owned()))
     }
 
     fn set_word(&mut self, key: &Key, word: &str, origin: Origin) -> Result<()> {

@@ -12,7 +12,7 @@ use super::generator::{GeneratorSetup, Inputs, generate};
 use super::records::StartRecord;
 use super::ring::{Answer, Flight, Job, RING, Slot};
 use crate::LaneCase;
-use lanesweep_support::{Error, Result};
+use lanesweep_support::{Error, Result, option};
 
 /// Requirements of a session on the device.
 pub(super) struct Setup {
@@ -103,7 +103,11 @@ pub(super) fn start(
 
 /// The error of a thread that ended.
 pub(super) fn gone(device: &str) -> Error {
-    Error::device(device, "it is closed, or its driver failed and ended its thread", "use option `backend = cpu`")
+    Error::device(
+        device,
+        "it is closed, or its driver failed and ended its thread",
+        format!("use {}", option("backend = cpu")),
+    )
 }
 
 struct DeviceOwner {

@@ -118,7 +118,7 @@ impl Reg157Profile {
     }
 
     /// Time that reaction and margins add to the braking time in the threshold, s.
-    pub(crate) fn reaction_and_margin_s(&self, dt_s: f64) -> f64 {
+    pub fn reaction_and_margin_s(&self, dt_s: f64) -> f64 {
         if self.margin_steps == 0.0 {
             return self.reaction_time_s + self.margin_s;
         }

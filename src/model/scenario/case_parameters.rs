@@ -9,7 +9,7 @@ use super::{Category, LANE_WIDTH_M, PlainCase, check_headway};
 use crate::plausibility::{Doubts, HELP, Quantity};
 use crate::profile::FrameProfile;
 use lanesweep_support::table::{NameUnit, Resolved, resolve};
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// The given values; speeds in m/s, lengths in m, accelerations in m/s², times in s. A quantity is its index:
 /// `parameters[CaseQuantity::Gap]`.
@@ -138,7 +138,7 @@ impl CaseParameters {
             let (Some(plausible), Some(value)) = (plausible, self[quantity]) else { continue };
             doubts
                 .check(plausible, value, || key.to_owned())
-                .map_err(|problem| Error::usage(Place::item(key), problem, HELP))?;
+                .map_err(|problem| Error::usage(Place::item(key), problem, HELP.as_str()))?;
         }
         Ok(())
     }
@@ -158,7 +158,7 @@ impl CaseParameters {
             doubts.check(Quantity::Speed, last_mps, || "the speed that results from the acceleration".to_owned());
         is_plausible.map_err(|text| {
             let problem = format!("it results in a speed that no vehicle has: {text}");
-            let help = "a deceleration is negative; an acceleration needs an end: option `end_speed`";
+            let help = format!("a deceleration is negative; an acceleration needs an end: {}", option("end_speed"));
             Error::usage(Place::item("acceleration"), problem, help)
         })?;
         Ok(plain)
@@ -246,6 +246,6 @@ fn missing(key: &str) -> Error {
         "lateral_speed" => "a speed in m/s",
         _ => "a speed with its unit, such as 60km/h,",
     };
-    let help = format!("give {what} with option `{key}` or as `{key}` in the file");
+    let help = format!("give {what} with {} or as `{key}` in the file", option(key));
     Error::usage(Place::item(key), "it is missing", help)
 }

@@ -172,7 +172,11 @@ pub(super) fn admit(
     let s = &*scenario;
     let mut check_plausible = |quantity, field: &str, value, prefix: &str| {
         let checked = doubts.check(quantity, value, || place(field));
-        checked.map_err(|text| Problem { field: field.to_owned(), problem: format!("{prefix}{text}"), help: HELP })
+        checked.map_err(|text| Problem {
+            field: field.to_owned(),
+            problem: format!("{prefix}{text}"),
+            help: HELP.as_str(),
+        })
     };
     let numbers = [
         (Quantity::Rate, "fps", Some(s.fps)),

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use lanesweep_support::files::{remove_file, write_atomically};
-use lanesweep_support::{Error, Place, Result, input_file};
+use lanesweep_support::{Error, Place, Result, input_file, option};
 
 /// Driven time and distance of the recordings that were searched for scenarios.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -126,7 +126,11 @@ impl DataProvenance {
             read => read?,
         };
         let wrong = |place: Place, problem: String| {
-            let help = "mine the recordings again, or remove this file and give option `hours` and option `km`";
+            let help = format!(
+                "mine the recordings again, or remove this file and give {} and {}",
+                option("hours"),
+                option("km")
+            );
             Err(Error::input(place, problem, help))
         };
         let content: ProvenanceFile = match serde_json::from_slice(&text) {

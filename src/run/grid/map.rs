@@ -4,7 +4,7 @@ use crate::check::Answer;
 use lanesweep_engine::{Executor, LanePlan, LaneRunner, SweepSummary, Verdicts, Wanted};
 use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::ModelId;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 use super::Grid;
 use super::plan::{GridPart, GridPlan};
@@ -152,9 +152,10 @@ impl GridMap {
         let problem =
             format!("all {lanes} lanes end at the time cap of {} s{alone}: the map is empty", frame.time_cap_s);
         let help = format!(
-            "check the time step ({} s, option `dt`), `frame.time_cap_s` of the profile, and the grid's speeds, lateral speeds \
+            "check the time step ({} s, {}), `frame.time_cap_s` of the profile, and the grid's speeds, lateral speeds \
              and gaps",
-            frame.dt_s
+            frame.dt_s,
+            option("dt")
         );
         Err(Error::usage(Place::item(format!("map {}", plan.grid.name)), problem, help))
     }

@@ -33,7 +33,7 @@ use lanesweep_model::driver::ModelId;
 use lanesweep_model::profile::Profile;
 use lanesweep_model::scenario::{Case, Category};
 use lanesweep_support::ranges::refuse_repeats;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Maximum number of cells of a grid.
 const MAX_CELLS: usize = 1_000_000;
@@ -164,7 +164,7 @@ impl Grid {
         for panel in &self.panels {
             let Some((ego_mps, other_mps)) = speeds(&self.panel_point(panel)) else {
                 let problem = "the speeds of both vehicles must be the panel's or fixed".to_owned();
-                let help = "give both by option `panel` or option `set`, or leave `map.closing` out";
+                let help = format!("give both by {} or {}, or leave `map.closing` out", option("panel"), option("set"));
                 return Err(Error::usage(Place::item("map.closing"), problem, help));
             };
             if ego_mps > other_mps {
@@ -330,7 +330,8 @@ fn run_up(style: CaseStyle, point: &Point, dt_s: f64) -> u32 {
 fn check_complete(category: Category, native_gap: bool, has: &dyn Fn(CaseQuantity) -> bool) -> Result<()> {
     let missing = |what: &str, example: &str| {
         let problem = format!("a map of {}s needs {what}", category.label());
-        let help = format!("give it by option `x`, option `y`, option `panel` or option `set` {example}");
+        let help =
+            format!("give it by {}, {}, {} or {} {example}", option("x"), option("y"), option("panel"), option("set"));
         Err(Error::usage(Place::item(what), problem, help))
     };
     let has_gap = has(CaseQuantity::Gap) || has(CaseQuantity::Thw);

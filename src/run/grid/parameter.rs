@@ -6,7 +6,7 @@ use lanesweep_model::plausibility::{Doubts, HELP, Quantity};
 use lanesweep_model::profile::Profile;
 use lanesweep_model::scenario::{CaseNumber, CaseQuantity, Category, LANE_WIDTH_M, NUMBERS, PlainCase, check_headway};
 use lanesweep_support::plain_text::nearest;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// A parameter as named in flags, tables and files.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -115,7 +115,7 @@ impl MapParameter {
             _ => self.si(value),
         };
         let checked = doubts.check(plausible, si, || self.key.to_owned());
-        checked.map_err(|problem| Error::usage(Place::item(self.key), problem, HELP))
+        checked.map_err(|problem| Error::usage(Place::item(self.key), problem, HELP.as_str()))
     }
 
     /// Checks the range of a value. A speed that is noise of a stationary vehicle becomes 0, with a warning.
@@ -197,8 +197,12 @@ impl Point {
         let speed_mps = case.speed_mps;
         if speed_mps < 0.0 {
             let problem = format!("the other vehicle would drive backwards, at {speed_mps} m/s");
-            let help = "give relative speeds of at least minus the ego's speed; a map leaves such panels out, where both \
-                        speeds belong to the panels (name other axes by option `x` and option `y`)";
+            let help = format!(
+                "give relative speeds of at least minus the ego's speed; a map leaves such panels out, where both \
+                        speeds belong to the panels (name other axes by {} and {})",
+                option("x"),
+                option("y")
+            );
             return Err(Error::usage(Place::item("relative_speed"), problem, help));
         }
         // Avoids a negative zero.

@@ -10,7 +10,7 @@ use super::Shard;
 use super::ledger::MergeableCounts;
 use super::sealed::{read_sealed, seal};
 use lanesweep_support::files::write_inside;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Maximum number of parts listed by name in an error.
 const NAMED: usize = 10;
@@ -154,8 +154,8 @@ pub fn read_part<T: MergeableCounts>(
     let (part, _): (Part<T>, _) = read_sealed("part", path, MAX_BYTES, &redo)?;
     let wrong = |problem: String, help: &str| Error::input(Place::file(path), problem, help);
     if part.run_sha256 != run_sha256 {
-        let help = "use one folder per run: move it away, or give another option `out`";
-        return Err(wrong("it is foreign: it belongs to another run than plan.json in this folder".to_owned(), help));
+        let help = format!("use one folder per run: move it away, or give another {}", option("out"));
+        return Err(wrong("it is foreign: it belongs to another run than plan.json in this folder".to_owned(), &help));
     }
     if part.units != *units {
         let problem = format!("it holds units {:?}, its name stands for {units:?}", part.units);

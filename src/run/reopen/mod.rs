@@ -21,7 +21,7 @@ use lanesweep_model::scenario::Scenario;
 use lanesweep_stats::density::DensityModel;
 use lanesweep_support::files::check_run_folder;
 use lanesweep_support::ranges::refuse_repeats;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Lanes that can be rerun.
 pub struct Reopened {
@@ -59,7 +59,7 @@ impl Reopened {
         }
         let plan = dir.join(PLAN_FILE);
         if !plan.exists() {
-            let help = "give the folder (option `out`) of a `lanesweep study` or `lanesweep sample`";
+            let help = format!("give the folder ({}) of a `lanesweep study` or `lanesweep sample`", option("out"));
             return Err(Error::input(Place::file(dir), "there is no run here", help));
         }
         match kind_of(&plan)?.as_str() {

@@ -10,7 +10,7 @@ use lanesweep_support::{Error, Place, Result, input_file};
 
 const VERSION: u64 = 1;
 
-const HOW_TO_REMAKE: &str = "write it again by `sample`, with option `estimator = is`";
+const HOW_TO_REMAKE: &str = "write it again by `sample --estimator is`";
 
 /// The mixture of a proposal over the parameters of a density.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -37,7 +37,7 @@ use crate::score::{ScoreOptions, ScoreTable, score};
 use lanesweep_engine::{LanePlan, Partial};
 use lanesweep_model::profile::Profile;
 use lanesweep_support::run_folder::Results;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 use lanesweep_traffic::mining::{Collection, MiningOptions, counts, counts_text};
 
 /// Maximum size of the first line that is read, bytes: checksums of the pages of scenarios, data of the recordings.
@@ -129,7 +129,7 @@ impl StudyBuilder<'_> {
             return Err(Error::input(
                 Place::item(data),
                 format!("no scenario to simulate ({})", counts_text(&counts(&collection.scenarios))),
-                "use more recordings, or relax the filters ([mining] in option `config`)",
+                format!("use more recordings, or relax the filters ([mining] in {})", option("config")),
             ));
         }
         let facts = StudyProvenance {
@@ -228,4 +228,4 @@ impl Study {
     }
 }
 
-const HOW_TO_REMAKE: &str = "make it by `study` of this version, with option `plan_only`";
+const HOW_TO_REMAKE: &str = "make it by `study --plan-only` of this version";

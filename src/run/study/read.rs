@@ -12,7 +12,7 @@ use lanesweep_engine::{Block, CaseTable, LanePlan, Units};
 use lanesweep_model::scenario::Scenario;
 use lanesweep_model::scenario::parameterization::Reduction;
 use lanesweep_support::plain_text::hex;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 impl StudyHead {
     /// The study with some of its scenarios; `first_held` is the unit of the first one.
@@ -49,8 +49,9 @@ impl StudyHead {
         place: &Place,
         wanted: impl FnOnce(u64) -> Range<u64>,
     ) -> Result<StudyCases> {
-        let wrong =
-            |problem: String| Error::input(place.clone(), problem, "make the plan again with option `plan_only`");
+        let wrong = |problem: String| {
+            Error::input(place.clone(), problem, format!("make the plan again with {}", option("plan_only")))
+        };
         let io = |e| Error::io(place.file.clone().unwrap_or_default(), "read", e);
         let count = self.unit_count();
         let wanted = wanted(count);

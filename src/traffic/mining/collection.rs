@@ -17,7 +17,7 @@ use crate::trajectory::generator::{GeneratorOptions, generate_one};
 use crate::trajectory::{FileChecksum, InputFile, Inputs, Loaded, Recording};
 use lanesweep_model::plausibility::Implausible;
 use lanesweep_model::scenario::{Category, Scenario, ScenarioFile, mined_id, usable};
-use lanesweep_support::{Error, Place, Result, readable};
+use lanesweep_support::{Error, Place, Result, option, readable};
 
 /// Results of one recording.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -131,7 +131,7 @@ pub(crate) fn filter_given(scenarios: &mut [Scenario], options: &MiningOptions, 
     }
     scenarios.iter_mut().zip(&given).for_each(|(of, kept)| of.kept = *kept);
     let is_other = given.iter().zip(&verdicts).any(|(given, (kept, _))| given != kept);
-    is_other.then(|| format!("scenarios are kept as given; by the filters (option `filter`) {text}"))
+    is_other.then(|| format!("scenarios are kept as given; by the filters ({}) {text}", option("filter")))
 }
 
 /// Names of vehicles that are longer have their number in ids.

@@ -9,7 +9,7 @@ use lanesweep_model::plausibility::Implausible;
 use lanesweep_support::atomic_file::folder_of;
 use lanesweep_support::files::{file_name, files_of};
 use lanesweep_support::input_file::unpacked;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Recordings whose format is known: highD's, or that of a preset.
 #[derive(Debug, Default)]
@@ -157,7 +157,8 @@ impl InputFile {
                 let place = Place::file(&self.paths()[0]).of(format!("recording {}", loaded.recording.id));
                 let format = if matches!(self, InputFile::Highd(_)) { HIGHD_HELP } else { "" };
                 let help = format!(
-                    "`lanesweep tracks` shows all; option `accept_implausible` uses the tracks as they are{format}"
+                    "`lanesweep tracks` shows all; {} uses the tracks as they are{format}",
+                    option("accept_implausible")
                 );
                 return Err(Error::input(place, grave.text.clone(), help));
             }
@@ -271,7 +272,7 @@ fn unknown(path: &Path) -> Error {
     Error::input(
         Place::file(path),
         format!("no preset fits this file{columns}"),
-        "name a preset by option `preset`, or rename the columns as in the preset `generic`",
+        format!("name a preset by {}, or rename the columns as in the preset `generic`", option("preset")),
     )
 }
 

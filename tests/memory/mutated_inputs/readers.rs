@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use lanesweep::engine::{Backend, CpuBackend, Headway, LanePlan, SampleTally, Wanted};
+use lanesweep::model::plausibility::Implausible;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::{Counted, Journal, Ledger, read_part, read_sealed_line};
 use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, plan_samples, read_proposal};

@@ -106,7 +106,7 @@ fn check_plausible(
     doubts: &mut Doubts,
 ) -> Result<()> {
     let judged = doubts.check(quantity, value, || table.field(column).to_string());
-    judged.map_err(|problem| table.bad(column, problem, HELP))
+    judged.map_err(|problem| table.bad(column, problem, HELP.as_str()))
 }
 
 fn yes_or_no(table: &CsvTable, column: CsvColumn) -> Result<bool> {

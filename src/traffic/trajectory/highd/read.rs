@@ -259,7 +259,7 @@ fn report(
     let columns = [columns.velocity_x, columns.velocity_y, columns.y, columns.acceleration_x];
     for ((quantity, value), column) in CHECKED.into_iter().zip(*sample).zip(columns) {
         let place = || table.field(column).of(format!("vehicle {}", track.id)).to_string();
-        doubts.check(quantity, value, place).map_err(|problem| table.bad(column, problem, HELP))?;
+        doubts.check(quantity, value, place).map_err(|problem| table.bad(column, problem, HELP.as_str()))?;
     }
     Ok(())
 }
