@@ -36,6 +36,9 @@ fn the_known_answers_of_random123() {
     ] {
         assert_eq!(philox4x32_10(counter, key), words);
     }
+    // Both halves of seed and index count.
+    let stream = Stream { seed: 0x5_0000_0002, purpose: 7 };
+    assert_eq!(stream.words(0x4_0000_0003, 1), philox4x32_10([3, 4, 1, 7], [2, 5]));
 }
 
 #[test]
