@@ -6,8 +6,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::{Bound, DriverModel, DriverProfile, DriverState, Hazard, View, delay_steps, latched_braking};
-use crate::model::category::Category;
-use crate::model::scalar::Real;
+use crate::category::Category;
+use crate::scalar::Real;
 
 /// Constants of the model as a profile gives them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
