@@ -351,6 +351,14 @@ mod tests {
     }
 
     #[test]
+    fn a_lateral_acceleration_below_one_is_in_use() {
+        let text = toml::to_string(&Profile::load("paper").unwrap()).unwrap();
+        let mut table: toml::Value = toml::from_str(&text).unwrap();
+        table["rss"]["lateral_acceleration_mps2"] = toml::Value::Float(0.8);
+        Profile::parse(&toml::to_string(&table).unwrap(), &Place::file(Path::new("own.toml"))).unwrap();
+    }
+
+    #[test]
     fn an_unusable_constant_is_named_with_its_key() {
         let error = Profile::load("paper").unwrap().with_dt(1e9).unwrap_err();
         assert!(error.to_string().contains("frame.dt_s"), "{error}");

@@ -21,10 +21,12 @@ pub struct Bound {
 }
 
 impl Bound {
-    /// A deceleration that a driver can demand, m/s²; less is one in g, or of cruising.
+    /// A deceleration that a driver demands, m/s². A smaller number is one in g.
     pub(crate) const DECELERATION: Bound = Bound::new("m/s²", 1.0, 100.0);
+    /// A lateral acceleration, m/s²: RSS has less than 1 in use.
+    pub(super) const LATERAL_ACCELERATION: Bound = Bound::new("m/s²", 0.001, 100.0);
     /// An acceleration or deceleration, or 0, m/s².
-    pub(super) const ACCELERATION: Bound = Bound::new("m/s²", 0.001, 100.0).or_zero();
+    pub(super) const ACCELERATION: Bound = Bound::LATERAL_ACCELERATION.or_zero();
     /// A jerk, m/s³.
     pub(crate) const JERK: Bound = Bound::new("m/s³", 0.001, 1e6);
     /// A time, s.

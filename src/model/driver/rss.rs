@@ -82,7 +82,7 @@ impl DriverProfile for RssProfile {
         vec![
             ("ego_deceleration_mps2", self.ego_deceleration_mps2, Bound::DECELERATION),
             ("other_deceleration_mps2", self.other_deceleration_mps2, Bound::DECELERATION),
-            ("lateral_acceleration_mps2", self.lateral_acceleration_mps2, Bound::DECELERATION),
+            ("lateral_acceleration_mps2", self.lateral_acceleration_mps2, Bound::LATERAL_ACCELERATION),
             ("jerk_mps3", self.jerk_mps3, Bound::JERK),
             ("max_deceleration_mps2", self.max_deceleration_mps2, Bound::DECELERATION),
             ("response_time_s", self.response_time_s, Bound::DELAY),
