@@ -110,8 +110,8 @@ impl ExternalReplay {
             let near = pairs.iter().copied().zip(next).filter(is_nearer).count();
             if pairs.len() >= 4 && 4 * near < 3 * pairs.len() {
                 tracing::warn!(
-                    "{}: only {near} of {} S' of the {}s begin and end with the speeds of their own scenario rather than \
-                     of the next one: check the ids",
+                    "{}: the first and last speeds of only {near} of {} S' ({}) are nearer to their own scenario than to the \
+                     next one: check the ids",
                     path.display(),
                     pairs.len(),
                     replay.category.label()
