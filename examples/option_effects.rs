@@ -16,7 +16,7 @@ use lanesweep::engine::{Chunk, CpuBackend, Executor, Partial, Wanted};
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::Job;
 use lanesweep::run::score::{ClaimResult, Misfit, ScoreTable, check_claims, f1};
-use lanesweep::run::study::{Study, StudyOptions};
+use lanesweep::run::study::Study;
 use lanesweep::scenario::parameterization::ParameterizationOptions;
 use lanesweep::scenario::{Other, Scenario};
 use lanesweep::traffic::mining::{Collection, MiningOptions, mine_generated};
@@ -119,8 +119,9 @@ impl Settings {
     }
 
     fn study(&self, collection: &Collection) -> lanesweep::Result<Study> {
-        let options = StudyOptions { parameterization: self.parameterization.clone(), ..StudyOptions::default() };
-        Study::builder(collection, self.profile.clone()).options(options).plan()
+        let mut study = Study::builder(collection, self.profile.clone());
+        study.options.parameterization = self.parameterization.clone();
+        study.plan()
     }
 
     fn scores(&self, collection: &Collection) -> Result<Scored, Box<dyn Error>> {

@@ -1,6 +1,6 @@
 """Other readers and writers of tracks beside lanesweep's: lxd-io reads the exiD fixture, omega-prime writes the same traffic.
 
-    cargo test --release --test traffic an_exid_fixture -- --ignored
+    cargo test --release --test library an_exid_fixture -- --ignored
     pip install lxd-io omega-prime pandas
     python track_readers.py LANESWEEP target/tmp/exid"""
 import csv

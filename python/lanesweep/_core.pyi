@@ -1,6 +1,7 @@
 """Types of the compiled module."""
 
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from typing import Any, final, overload
 from typing_extensions import disjoint_base
 
@@ -183,7 +184,8 @@ class View:
 
 def run(
     function: str,
-    arguments: dict[str, Any],
+    call: str,
+    arguments: dict[str, bool | list[str | Path]],
     on_progress: Callable[[str, int, int], None] | None = None,
     on_message: Callable[[str, str], None] | None = None,
 ) -> tuple[int, str, str]: ...

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import json
 import logging
 import numbers
 import os
@@ -162,6 +163,31 @@ def _texts(value: Any) -> Iterator[str]:
             yield from _texts(one)
 
 
+def _word(value: Any) -> str | Path:
+    """Return a value as a command line has it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, list):
+        return ",".join(str(_word(one)) for one in value)
+    return repr(value).removesuffix(".0") if isinstance(value, float) else value if isinstance(value, Path) else str(value)
+
+
+def _words(value: Any) -> bool | list[str | Path]:
+    """Return the value of an argument as words of a command line."""
+    if isinstance(value, dict):
+        return [f"{name}={_word(one)}" for name, one in value.items()]
+    return value if isinstance(value, bool) else [_word(one) for one in (value if isinstance(value, list) else [value])]
+
+
+def _shown(value: Any) -> str:
+    """Write a value as in a call."""
+    if isinstance(value, list):
+        return f"[{', '.join(_shown(one) for one in value)}]"
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_shown(name)}: {_shown(one)}" for name, one in value.items()) + "}"
+    return json.dumps(str(value), ensure_ascii=False) if isinstance(value, (str, Path)) else repr(value)
+
+
 def run(function: str, arguments: Mapping[str, Any], *, default_out: str | None = None, path: Any = None) -> Result:
     """Run a verb by the name of its function.
 
@@ -204,8 +230,10 @@ def run(function: str, arguments: Mapping[str, Any], *, default_out: str | None 
 
     move, close = progress()
     refresh(_texts(values))
+    shown = ", ".join(f"{name}={_shown(value)}" for name, value in values.items() if name != "out" and value is not False)
+    call = os.fsencode(f"lanesweep.{function}({shown})").decode(errors="replace")
     try:
-        code, text, document = _core.run(function, values, move, on_line)
+        code, text, document = _core.run(function, call, {name: _words(value) for name, value in values.items()}, move, on_line)
     finally:
         close()
     if code == _NOTHING:

@@ -16,7 +16,7 @@ use lanesweep::model::plausibility::Implausible;
 use lanesweep::model::profile::Profile;
 use lanesweep::report::lanes::{case_columns, case_row};
 use lanesweep::run::cases::Cases;
-use lanesweep::scenario::{CaseParameters, Category, NamedNumber, Written};
+use lanesweep::scenario::{CaseParameters, CaseQuantity, Category, NamedNumber, Written};
 use lanesweep::support::plain_text::nearest;
 use lanesweep::support::readable::counted;
 use lanesweep::support::table::ArrowRows;
@@ -240,9 +240,10 @@ fn rows_of(
 
 /// The rows without a speed, in a table that has speeds or of cut-ins: the ego's is taken.
 fn without_speed(rows: &[CaseParameters]) -> impl Iterator<Item = usize> + '_ {
-    let has_speeds = rows.iter().any(|row| row.speed.is_some());
+    let has_speeds = rows.iter().any(|row| row[CaseQuantity::OtherSpeed].is_some());
     let is_cut_in = |row: &CaseParameters| row.category.as_deref().and_then(Category::parse) == Some(Category::CutIn);
-    let is_doubtful = move |row: &CaseParameters| row.speed.is_none() && (has_speeds || is_cut_in(row));
+    let is_doubtful =
+        move |row: &CaseParameters| row[CaseQuantity::OtherSpeed].is_none() && (has_speeds || is_cut_in(row));
     rows.iter().enumerate().filter(move |(_, row)| is_doubtful(row)).map(|(at, _)| at)
 }
 

@@ -2,16 +2,17 @@
 //! for signals and passes on progress and messages.
 
 use std::ffi::OsString;
+use std::path::PathBuf;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::Duration;
 
-use lanesweep::cli::embedded::{self, Value};
+use lanesweep::cli::embedded::{self, Given};
 use lanesweep::{Error, Place, Result};
 use pyo3::exceptions::{PyException, PyKeyboardInterrupt};
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString};
+use pyo3::types::PyDict;
 
 use crate::driver;
 use crate::error::{exception, in_arguments};
@@ -129,47 +130,36 @@ fn pass_on(
     py.check_signals()
 }
 
-/// The value of an argument.
-fn value(given: &Bound<'_, PyAny>) -> PyResult<Value> {
-    if given.is_instance_of::<PyBool>() {
-        return Ok(Value::Boolean(given.extract()?));
-    }
-    if given.is_instance_of::<PyInt>() {
-        // One with more digits keeps them, for the message that refuses it.
-        return given.extract().map(Value::Whole).or_else(|_| Ok(Value::Text(given.str()?.extract()?)));
-    }
-    if given.is_instance_of::<PyFloat>() {
-        return Ok(Value::Number(given.extract()?));
-    }
-    if let Ok(rows) = given.cast::<PyDict>() {
-        return rows
-            .iter()
-            .map(|(name, one)| Ok((name.extract()?, value(&one)?)))
-            .collect::<PyResult<_>>()
-            .map(Value::Table);
-    }
-    if let Ok(list) = given.cast::<PyList>() {
-        return list.iter().map(|one| value(&one)).collect::<PyResult<_>>().map(Value::List);
-    }
-    if given.is_instance_of::<PyString>() {
-        return Ok(Value::Text(given.extract()?));
-    }
-    Ok(Value::Path(given.extract()?))
+/// The value of an argument: whether a flag is present, or values as a command line has them.
+#[derive(FromPyObject)]
+enum Argument {
+    Flag(bool),
+    Words(Vec<PathBuf>),
 }
 
-/// Runs a verb by the name of its function, with named values: numbers, texts, and lists and dictionaries of them.
+impl From<Argument> for Given {
+    fn from(argument: Argument) -> Given {
+        match argument {
+            Argument::Flag(is_present) => Given::Flag(is_present),
+            Argument::Words(words) => Given::Words(words.into_iter().map(PathBuf::into_os_string).collect()),
+        }
+    }
+}
+
+/// Runs a verb by the name of its function, with the values of named arguments.
 #[pyfunction]
-#[pyo3(signature = (function, arguments, on_progress=None, on_message=None))]
+#[pyo3(signature = (function, call, arguments, on_progress=None, on_message=None))]
 pub fn run(
     py: Python<'_>,
     function: String,
+    call: String,
     arguments: &Bound<'_, PyDict>,
     on_progress: Option<&Bound<'_, PyAny>>,
     on_message: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<(u8, String, String)> {
-    let values = arguments.iter().map(|(name, one)| Ok((name.extract()?, value(&one)?)));
-    let values = values.collect::<PyResult<Vec<(String, Value)>>>()?;
-    let output = watched(py, on_progress, on_message, move || embedded::run(&function, values))?;
+    let given = arguments.iter().map(|(name, one)| Ok((name.extract()?, one.extract::<Argument>()?.into())));
+    let given = given.collect::<PyResult<Vec<(String, Given)>>>()?;
+    let output = watched(py, on_progress, on_message, move || embedded::run(&function, call, given))?;
     Ok((output.exit.code(), output.text, output.document))
 }
 

@@ -3,15 +3,15 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
+use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
 
-use super::arguments::{Arguments, FromArguments};
 use lanesweep_engine::Headway;
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::plausibility::{Doubts, Implausible};
 use lanesweep_model::profile::Profile;
 use lanesweep_model::scenario::{
-    CaseFile, CaseNumber, CaseParameters, CaseRow, NUMBERS, ParameterRows, PlainCase, RowPlace, Written, si,
+    CaseFile, CaseNumber, CaseParameters, CaseQuantity, CaseRow, NUMBERS, ParameterRows, PlainCase, RowPlace, Written,
+    si,
 };
 use lanesweep_run::check::Subject;
 use lanesweep_run::reopen::TracedCase;
@@ -43,7 +43,8 @@ fn written(number: &'static CaseNumber) -> impl Fn(&str) -> std::result::Result<
 impl Args for CaseFlags {
     fn augment_args(command: Command) -> Command {
         let category = Arg::new("category").value_name("NAME").help("Kind of scenario: cut-in, cut-out, lvd");
-        let models = Arg::new("models").value_name("LIST").help(super::lists::models_help());
+        let models = Arg::new("models").value_name("LIST").action(ArgAction::Append).value_delimiter(',');
+        let models = models.help(super::lists::models_help());
         let command = command
             .arg(category.long("category").help_heading("Scenario"))
             .arg(models.long("models").help_heading("Models and criteria"));
@@ -66,34 +67,22 @@ impl Args for CaseFlags {
     }
 }
 
-impl CaseFlags {
-    fn of(mut text: impl FnMut(&'static str) -> Result<Option<String>>) -> Result<CaseFlags> {
-        let mut parameters = CaseParameters { category: text("category")?, ..CaseParameters::default() };
-        for number in numbers() {
-            let Some(text) = text(number.key)? else { continue };
-            let set = number.set_text(&mut parameters, &text);
-            set.map_err(|problem| Error::usage(Place::option(number.key), problem, ""))?;
-        }
-        Ok(CaseFlags { parameters, models: text("models")? })
-    }
-}
-
 impl FromArgMatches for CaseFlags {
     fn from_arg_matches(matches: &ArgMatches) -> std::result::Result<CaseFlags, clap::Error> {
-        let found = CaseFlags::of(|name| Ok(matches.get_one::<String>(name).cloned()));
-        // The parsers have checked the numbers.
-        found.map_err(|error| clap::Error::raw(clap::error::ErrorKind::ValueValidation, error))
+        let category = matches.get_one::<String>("category").cloned();
+        let mut parameters = CaseParameters { category, ..CaseParameters::default() };
+        for number in numbers() {
+            let Some(text) = matches.get_one::<String>(number.key) else { continue };
+            let kind = clap::error::ErrorKind::ValueValidation;
+            number.set_text(&mut parameters, text).map_err(|problem| clap::Error::raw(kind, problem))?;
+        }
+        let models = matches.get_many::<String>("models").map(|names| names.cloned().collect::<Vec<_>>().join(","));
+        Ok(CaseFlags { parameters, models })
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> std::result::Result<(), clap::Error> {
         *self = CaseFlags::from_arg_matches(matches)?;
         Ok(())
-    }
-}
-
-impl FromArguments for CaseFlags {
-    fn from_arguments(arguments: &mut Arguments) -> Result<CaseFlags> {
-        CaseFlags::of(|name| arguments.take(name))
     }
 }
 
@@ -111,7 +100,7 @@ pub(super) struct GivenCase {
 impl CaseFlags {
     /// Width of the lanes, m, if given.
     pub(super) fn lane_width_m(&self) -> Option<f64> {
-        self.parameters.lane_width
+        self.parameters[CaseQuantity::LaneWidth]
     }
 
     /// Values of `self` where given, otherwise those of a file.
@@ -131,18 +120,18 @@ impl CaseFlags {
 
     /// The initial distance, if given.
     pub(super) fn start(&self) -> Result<Option<Headway>> {
-        let is_given = self.parameters.gap.is_some() || self.parameters.thw.is_some();
+        let is_given = [CaseQuantity::Gap, CaseQuantity::Thw].iter().any(|start| self.parameters[*start].is_some());
         if is_given { self.over(GivenCase::default()).headway().map(Some) } else { Ok(None) }
     }
 
     /// Whether it gives a value of the case other than the width of the lanes.
     pub(super) fn says_more_than_lanes(&self) -> bool {
-        CaseParameters { lane_width: None, ..self.parameters.clone() } != CaseParameters::default()
+        self.parameters.given().iter().any(|key| *key != "lane_width")
     }
 
     /// Whether it gives a value of the case other than the ego's start.
     pub(super) fn says_more_than_a_start(&self) -> bool {
-        CaseParameters { gap: None, thw: None, ..self.parameters.clone() } != CaseParameters::default()
+        self.parameters.given().iter().any(|key| !matches!(*key, "gap" | "thw"))
     }
 
     /// The named models; `None` if none is named.
@@ -172,7 +161,7 @@ impl GivenCase {
     }
 
     pub(super) fn headway(&self) -> Result<Headway> {
-        let CaseParameters { gap, thw, .. } = self.parameters;
+        let (gap, thw) = (self.parameters[CaseQuantity::Gap], self.parameters[CaseQuantity::Thw]);
         self.located(self.parameters.check_start())?;
         let start = gap.map(Headway::GapM).or(thw.map(Headway::thw));
         self.located(start.ok_or_else(|| {

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::arguments::from_arguments;
 use super::case_flags::{CaseFlags, GivenCase, from_table, from_toml};
 use super::check_table::CheckedTable;
 use super::configured::Configured;
@@ -50,12 +49,12 @@ pub(super) struct Check {
     #[arg(value_name = "FILE", help_heading = "Data")]
     file: Option<PathBuf>,
     /// Row of a table, from 1 after the header [default: all rows]
-    #[arg(long, value_name = "N", help_heading = "Data")]
+    #[arg(long, value_name = "N", requires = "file", help_heading = "Data")]
     row: Option<usize>,
     /// Scenario of a scenario file, by its id
     ///
     /// It starts with its observed gap, or with --gap or --thw.
-    #[arg(long, value_name = "ID", conflicts_with = "row", help_heading = "Data")]
+    #[arg(long, value_name = "ID", requires = "file", conflicts_with = "row", help_heading = "Data")]
     scenario: Option<String>,
     #[command(flatten)]
     case: CaseFlags,
@@ -84,11 +83,6 @@ pub(super) struct Check {
     #[command(flatten)]
     format: FormatFlag,
 }
-
-from_arguments!(
-    Check { file, row, scenario, profiles, sheet, rows, nominal, date, author }
-    groups { case, plausibility, format }
-);
 
 /// The checked case, with facts for the reader.
 struct CheckRequest {

@@ -10,7 +10,6 @@ use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, FromArgMatches};
 use indicatif::ProgressBar;
 
-use super::arguments::{Arguments, NEEDS, Value};
 use super::console::{self, Total, Verbosity};
 use super::help::{DATA, MODELS, RUN};
 use super::signals::CANCEL;
@@ -147,12 +146,6 @@ fn with_flags(mut command: Command, keys: &[Key]) -> Command {
         }
         command = command.arg(arg);
     }
-    for (verbs, name, needed) in NEEDS {
-        // `config check` has the name of another verb.
-        if verbs.contains(&verb.as_str()) && command.get_arguments().any(|arg| arg.get_id() == name) {
-            command = command.mut_arg(name, |arg| arg.requires(needed));
-        }
-    }
     command
 }
 
@@ -233,34 +226,14 @@ impl Configured {
             if last.value_source(id) == Some(ValueSource::CommandLine)
                 && let Some(word) = last.get_raw(id).and_then(|mut words| words.next())
             {
-                layers.flag(key, &flag_name(id), Value::Text(word.to_owned()))?;
+                layers.flag(key, &flag_name(id), &word.to_string_lossy())?;
             }
         }
         let configured = Configured::combined(layers, command, cli.common.verbosity())?;
-        configured.fill(&mut cli.verb);
+        if let Verb::Sample(sample) = &mut cli.verb {
+            sample.settings = configured.settings.sample.clone();
+        }
         Ok((cli, configured))
-    }
-
-    /// The same for a verb that is called as a function.
-    ///
-    /// # Errors
-    /// As [`Layers::read`] and [`Layers::flag`].
-    pub(super) fn of_arguments(arguments: &mut Arguments, verb: &str) -> Result<Configured> {
-        let typed: Vec<String> = arguments.take("config")?;
-        let mut layers = layers(&typed.iter().map(|text| Assignment::of(text)).collect::<Vec<_>>())?;
-        for (key, id, ..) in flags_of("lanesweep").chain(flags_of(verb)) {
-            if let Some(value) = arguments.value(id) {
-                layers.flag(key, &flag_name(id), value)?;
-            }
-        }
-        Configured::combined(layers, arguments.call().to_owned(), Verbosity::Normal)
-    }
-
-    /// Gives a verb its settings.
-    pub(super) fn fill(&self, verb: &mut Verb) {
-        if let Verb::Sample(sample) = verb {
-            sample.settings = self.settings.sample.clone();
-        }
     }
 
     fn combined(layers: Layers, command: String, verbosity: Verbosity) -> Result<Configured> {
@@ -498,33 +471,5 @@ impl Configured {
     pub(super) fn open_to_verify(&self) -> Result<OpenBackend> {
         let (backend, device) = self.backend()?;
         OpenBackend::open_to_verify(backend, device.as_ref())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_flag_that_sets_a_key_is_of_a_verb_and_has_the_keys_default_and_words() {
-        let keys = Key::all();
-        let find = |verb: &str| -> Option<Command> {
-            let command = command();
-            let inner = command.get_subcommands().flat_map(|verb| std::iter::once(verb).chain(verb.get_subcommands()));
-            std::iter::once(&command).chain(inner).find(|command| command.get_name() == verb).cloned()
-        };
-        for (name, id, .., verbs) in FLAGS {
-            let key = Key::find(&keys, name).unwrap_or_else(|| panic!("{name}"));
-            for verb in verbs {
-                let verb = find(verb).unwrap_or_else(|| panic!("{verb}"));
-                let arg = verb.get_arguments().find(|arg| arg.get_id() == id).unwrap_or_else(|| panic!("{id}"));
-                assert!(arg.get_help().is_some_and(|help| help.to_string().len() > 4), "{name}");
-                let Some(default) = &key.default else { continue };
-                let [written] = arg.get_default_values() else { panic!("{name}") };
-                let mut layers = Layers::defaults();
-                layers.flag(name, id, Value::Text(written.clone().into())).unwrap();
-                assert_eq!(layers.get(name).unwrap().value, Some(default), "{name}");
-            }
-        }
     }
 }

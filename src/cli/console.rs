@@ -50,6 +50,11 @@ pub(super) fn captured() -> MutexGuard<'static, Option<Captured>> {
     CAPTURED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// Whether a program has called a verb as a function.
+pub(super) fn is_captured() -> bool {
+    captured().is_some()
+}
+
 /// Adds a line to what is captured; false if the program prints.
 fn capture(level: Level, line: &str) -> bool {
     let mut captured = captured();
@@ -96,7 +101,7 @@ pub(super) fn start_log(verbosity: Verbosity) {
     let _ = tracing_subscriber::fmt()
         .with_writer(Log)
         // The owner of what is captured gets the level beside the line.
-        .with_level(captured().is_none())
+        .with_level(!is_captured())
         // If stderr is closed or full, no message can be shown, and writing one would panic.
         .log_internal_errors(false)
         // A message is one line, whatever characters a file name has.
@@ -293,7 +298,7 @@ fn unbroken(text: &str) -> String {
 
 /// Prints an error with its help on stderr.
 pub(super) fn complain(error: &Error) {
-    if captured().is_some() {
+    if is_captured() {
         // In the words of the library.
         capture(Level::ERROR, &format!("{error}; {}", error.help().unwrap_or_default()));
         return;
@@ -343,82 +348,5 @@ struct Diagnostic {
 impl miette::Diagnostic for Diagnostic {
     fn help<'a>(&'a self) -> Option<Box<dyn std::fmt::Display + 'a>> {
         self.help.as_ref().map(|help| Box::new(help) as Box<dyn std::fmt::Display>)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{flag_of, remaining, tell_at_intervals, with_flags};
-    use indicatif::{ProgressBar, ProgressDrawTarget};
-    use std::sync::mpsc;
-    use std::time::Duration;
-
-    #[test]
-    fn a_run_without_a_terminal_tells_what_is_done_of_how_much_until_it_ends() {
-        let bar = ProgressBar::with_draw_target(Some(9600), ProgressDrawTarget::hidden());
-        bar.set_message("sweeping");
-        bar.set_elapsed(Duration::from_secs(120));
-        bar.inc(1200);
-        let (sender, lines) = mpsc::channel();
-        let weak = bar.downgrade();
-        let teller = std::thread::spawn(move || {
-            tell_at_intervals(&weak, "about", Duration::from_millis(5), |line| sender.send(line).unwrap());
-        });
-        for _ in 0..2 {
-            let line = lines.recv_timeout(Duration::from_secs(10)).unwrap();
-            assert_eq!(line, "sweeping: 1,200 of 9,600 (12 %) in 2m, about 14m left");
-        }
-        bar.finish_and_clear();
-        teller.join().unwrap();
-    }
-
-    #[test]
-    fn the_remaining_time_is_told_once_some_seconds_are_measured() {
-        let told =
-            |measured_s, left_s| remaining("about", Duration::from_secs(measured_s), Duration::from_secs(left_s));
-        assert_eq!([told(0, 60), told(2, 60), told(60, 0)], ["", "", ""]);
-        assert_eq!([told(3, 40), told(600, 7200)], [", about 40s left", ", about 2h left"]);
-    }
-
-    #[test]
-    fn an_option_of_the_library_is_a_flag_on_the_command_line() {
-        for (text, shown) in [
-            ("option `accept_implausible` uses it", "--accept-implausible uses it"),
-            ("use option `backend = cpu`, or split", "use --backend cpu, or split"),
-            ("option `x`, option `y`", "--x, --y"),
-            ("there is no option `Ünknown`, nor option `open", "there is no option `Ünknown`, nor option `open"),
-        ] {
-            assert_eq!(with_flags(text), shown);
-        }
-    }
-
-    /// The fields that a source text marks.
-    fn fields(text: &str) -> impl Iterator<Item = &str> {
-        let marks = ["option `", "Place::option(\""].into_iter().flat_map(|mark| text.split(mark).skip(1));
-        marks.filter_map(move |rest| rest.get(..rest.find(|c: char| !c.is_ascii_lowercase() && c != '_')?))
-    }
-
-    #[test]
-    fn every_field_that_an_error_names_has_a_flag() {
-        fn flags(command: &clap::Command, known: &mut Vec<String>) {
-            known.extend(command.get_arguments().filter_map(|arg| arg.get_long().map(str::to_owned)));
-            command.get_subcommands().for_each(|verb| flags(verb, known));
-        }
-        let mut known = Vec::new();
-        flags(&crate::configured::command(), &mut known);
-        let mut folders = vec![std::path::PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))];
-        let mut found = 0;
-        while let Some(path) = folders.pop() {
-            if path.is_dir() {
-                folders.extend(std::fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path()));
-            } else if !path.ends_with("cli/console.rs") {
-                let text = std::fs::read_to_string(&path).unwrap();
-                for field in fields(&text).filter(|field| !field.is_empty()) {
-                    assert!(known.contains(&flag_of(field)), "{}: option `{field}`", path.display());
-                    found += 1;
-                }
-            }
-        }
-        assert!(found > 100, "{found}");
     }
 }

@@ -3,74 +3,30 @@
 
 use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 
-pub use super::arguments::Value;
-use super::arguments::{self, Arguments, FromArguments};
-use super::configured::{self, Configured};
+pub use super::arguments::{Given, arguments};
+use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::signals::CANCEL;
-use super::{Output, Verb, not_started, pool_of, without_panic};
+use super::{Output, not_started, pool_of, without_panic};
 use lanesweep_support::cancel::Cancel;
 use lanesweep_support::{Error, Place, Result};
 
 /// Stack of the threads that run a verb, bytes.
 pub const STACK_BYTES: usize = 8 << 20;
 
-/// A verb as a function: its name, its words on a command line, and its options.
-type Function = (&'static str, &'static [&'static str], fn(&mut Arguments) -> Result<Verb>);
-
-#[rustfmt::skip] // a table
-const FUNCTIONS: [Function; 9] = [
-    ("study", &["study"], |given| Ok(Verb::Study(of(given)?))),
-    ("tracks", &["tracks"], |given| Ok(Verb::Tracks(of(given)?))),
-    ("mine", &["mine"], |given| Ok(Verb::Mine(of(given)?))),
-    ("fit", &["fit"], |given| Ok(Verb::Fit(of(given)?))),
-    ("sample", &["sample"], |given| Ok(Verb::Sample(of(given)?))),
-    ("map", &["map"], |given| Ok(Verb::Map(of(given)?))),
-    ("check", &["check"], |given| Ok(Verb::Check(of(given)?))),
-    ("trace", &["simulate"], |given| Ok(Verb::Simulate(of(given)?))),
-    ("merge", &["merge"], |given| Ok(Verb::Merge(of(given)?))),
-];
-
-fn of<T: FromArguments>(arguments: &mut Arguments) -> Result<T> {
-    T::from_arguments(arguments)
-}
-
-/// A function with the definition of its verb.
-fn find(function: &str) -> Result<(Function, clap::Command)> {
-    let found = FUNCTIONS.into_iter().find(|(name, ..)| *name == function);
-    let found = found.ok_or_else(|| Error::usage(Place::item(function), "there is no such function", ""))?;
-    let mut program = configured::command();
-    program.build();
-    let verb = found.1.iter().try_fold(&program, |command, word| command.find_subcommand(word));
-    let verb = verb.cloned().ok_or_else(|| Error::Internal(format!("there is no verb of {function}")))?;
-    Ok((found, verb))
-}
-
-/// Names of a function's arguments.
-///
-/// # Errors
-/// [`Error::Usage`] for an unknown function.
-pub fn arguments(function: &str) -> Result<Vec<String>> {
-    Ok(arguments::names(&find(function)?.1).map(str::to_owned).collect())
-}
-
-/// Runs a verb with named values; those of its flags and positions. One verb runs at a time in a process.
+/// Runs a verb with named values of its flags and positions; `call` is for repeating it. One verb runs at a time in a
+/// process.
 ///
 /// # Errors
 /// [`Error::Usage`] for an unknown or unusable argument; [`Error::Busy`] while another verb runs; those of the verb.
-pub fn run(function: &str, values: Vec<(String, Value)>) -> Result<Output> {
+pub fn run(function: &str, call: String, given: Vec<(String, Given)>) -> Result<Output> {
     alone(|| {
         let result = without_panic(|| {
-            let ((.., verb), command) = find(function)?;
-            let name = command.get_name().to_owned();
-            let mut arguments = Arguments::new(command, function, values)?;
-            let configured = Configured::of_arguments(&mut arguments, &name)?;
-            let mut verb = verb(&mut arguments)?;
-            configured.fill(&mut verb);
+            let (cli, configured) = Configured::of(&super::arguments::parse(function, given)?, call)?;
             let requested = configured.settings.run.threads;
             let pool = pool_of(requested)?.stack_size(STACK_BYTES);
             let pool = pool.build().map_err(|error| not_started(requested, &error))?;
-            pool.install(|| verb.run(&configured))
+            pool.install(|| cli.verb.run(&configured))
         });
         console::captured().iter_mut().for_each(|captured| captured.bar = None);
         result
@@ -144,46 +100,4 @@ pub fn progress() -> Option<(String, u64, u64)> {
 /// Takes the lines of the log and of standard error since the last call, with their levels.
 pub fn take_messages() -> Vec<(tracing::Level, String)> {
     console::captured().as_mut().map(|captured| std::mem::take(&mut captured.messages)).unwrap_or_default()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::arguments::NEEDS;
-
-    fn refusal(function: &str, values: &[(&str, Value)]) -> String {
-        let values = values.iter().map(|(name, value)| ((*name).to_owned(), value.clone())).collect();
-        run(function, values).unwrap_err().to_string()
-    }
-
-    #[test]
-    fn values_exclude_and_need_what_words_do() {
-        let text = |text: &str| Value::Text(text.into());
-        let both = [("recordings", text("a")), ("scenarios", text("b.jsonl"))];
-        assert_eq!(refusal("study", &both), "`recordings`: it cannot be used with `scenarios`");
-        assert_eq!(refusal("trace", &[("plot_end", Value::Number(3.0))]), "`plot_end`: it needs `plot`");
-        assert_eq!(refusal("map", &[]), "`category`: it is needed");
-        assert_eq!(refusal("study", &[("backnd", text("cpu"))]), "`backnd`: study has no such argument");
-        assert_eq!(refusal("study", &[("thw", Value::Boolean(false))]), "`thw`: False is not a value of it");
-        assert_eq!(
-            refusal("check", &[("row", Value::Number(1.5)), ("file", text("a.csv"))]),
-            "option `row`: 1.5 is not a whole number from 0"
-        );
-        assert!(refusal("study", &[("seed", Value::Number(0.5))]).contains("`0.5` cannot be used"));
-    }
-
-    #[test]
-    fn what_an_argument_needs_is_one_of_its_verb() {
-        for (verbs, name, needed) in NEEDS {
-            let functions =
-                FUNCTIONS.iter().filter(|(_, words, _)| words.last().is_some_and(|verb| verbs.contains(verb)));
-            let mut found = 0;
-            for (function, ..) in functions {
-                let names = arguments(function).unwrap();
-                assert!([name, needed].iter().all(|one| names.iter().any(|known| known == one)), "{function}: {name}");
-                found += 1;
-            }
-            assert!(found > 0, "{name}");
-        }
-    }
 }

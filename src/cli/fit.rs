@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::console::{self, Total};
 use super::format::FormatFlag;
@@ -57,11 +56,6 @@ pub(super) struct Fit {
     #[command(flatten)]
     format: FormatFlag,
 }
-
-from_arguments!(
-    Fit { out, with_thw, without_scenarios }
-    groups { data, categories, parameterizations, exposure, format }
-);
 
 impl Fit {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
@@ -176,11 +170,7 @@ fn text(facts: &DataProvenance, fitted: &[(PathBuf, DensityModel)]) -> String {
 }
 
 fn document(facts: &DataProvenance, fitted: &[(PathBuf, DensityModel)], settings: &[SettingRecord]) -> Result<String> {
-    let densities = fitted.iter().map(|(file, model)| {
-        let mut record = density::record(model);
-        record["file"] = file.display().to_string().into();
-        record
-    });
+    let densities = fitted.iter().map(|(file, model)| density::record(model, file));
     records::document(&serde_json::json!({
         "program": format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
         "data": facts.data,

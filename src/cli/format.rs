@@ -2,7 +2,6 @@
 
 use clap::{Args, ValueEnum};
 
-use super::arguments::{Arguments, FromArguments};
 use super::{Exit, Output, console};
 use lanesweep_report::study::StudyReport;
 use lanesweep_report::tables;
@@ -17,9 +16,6 @@ pub(super) enum Format {
     Text,
     /// One JSON document.
     Json,
-    /// Both, for a program that calls a verb as a function.
-    #[value(skip)]
-    Both,
 }
 
 /// `--format`.
@@ -37,17 +33,20 @@ impl FormatFlag {
         self.format == Format::Json
     }
 
-    /// Prints text or document, whichever is asked for and alone is built; returns both to a program that asks for both.
+    /// Prints text or document, whichever is asked for and alone is built; returns both to a program that calls the verb
+    /// as a function.
     pub(super) fn output(
         self,
         exit: Exit,
         text: impl FnOnce() -> String,
         json: impl FnOnce() -> Result<String>,
     ) -> Result<Output> {
+        if console::is_captured() {
+            return Ok(Output { exit, text: text(), document: json()? });
+        }
         match self.format {
             Format::Text => console::print(&text())?,
             Format::Json => console::print_json(&json()?)?,
-            Format::Both => return Ok(Output { exit, text: text(), document: json()? }),
         }
         Ok(exit.into())
     }
@@ -87,11 +86,5 @@ impl FormatFlag {
                 &serde_json::json!({"lanes": lanes, "plan": path.display().to_string()}),
             )
         })
-    }
-}
-
-impl FromArguments for FormatFlag {
-    fn from_arguments(_: &mut Arguments) -> Result<FormatFlag> {
-        Ok(FormatFlag { format: Format::Both })
     }
 }

@@ -232,32 +232,3 @@ fn refused(requested: Option<usize>, reason: String) -> Error {
     let what = requested.map_or("the worker threads".to_owned(), |requested| format!("--threads {requested}"));
     Error::io(what, "start", std::io::Error::new(std::io::ErrorKind::WouldBlock, reason))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::{Exit, run_and_report};
-    use rayon::prelude::*;
-
-    #[test]
-    fn the_flags_do_not_contradict_one_another() {
-        super::configured::command().debug_assert();
-    }
-
-    #[test]
-    fn a_panic_in_any_worker_is_a_defect_that_is_told_and_no_crash() {
-        let in_a_task = || {
-            (0..1000).into_par_iter().for_each(|k| assert!(k != 700, "shader_patch"));
-            Ok(Exit::Ok)
-        };
-        let in_a_thread = || {
-            std::thread::scope(|scope| {
-                scope.spawn(|| panic!("shader_patch"));
-            });
-            Ok(Exit::Ok)
-        };
-        assert_eq!(run_and_report(in_a_task), Exit::Internal);
-        assert_eq!(run_and_report(in_a_thread), Exit::Internal);
-        assert_eq!(run_and_report(|| Ok(Exit::Ok)), Exit::Ok, "the pool works on");
-        assert_eq!((0..1000).into_par_iter().sum::<i32>(), 499_500);
-    }
-}

@@ -3,7 +3,6 @@
 
 use clap::Args;
 
-use super::arguments::from_arguments;
 use lanesweep_engine::Headway;
 use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::ModelId;
@@ -39,8 +38,6 @@ pub(super) struct CategoriesFlag {
     categories: Vec<String>,
 }
 
-from_arguments!(CategoriesFlag { categories });
-
 impl CategoriesFlag {
     /// In the order of every table.
     ///
@@ -61,8 +58,6 @@ pub(super) struct ParameterizationsFlag {
     parameterizations: Vec<String>,
 }
 
-from_arguments!(ParameterizationsFlag { parameterizations });
-
 impl ParameterizationsFlag {
     /// The parameterizations of the categories, in the registry's order.
     ///
@@ -79,8 +74,6 @@ pub(super) struct ModelsFlag {
     #[arg(long, value_name = "LIST", value_delimiter = ',', help = models_help(), help_heading = "Models and criteria")]
     models: Vec<String>,
 }
-
-from_arguments!(ModelsFlag { models });
 
 impl ModelsFlag {
     /// The models in the order of every table; all if none is named.
@@ -110,11 +103,9 @@ pub(super) struct HeadwaysFlag {
     /// The paper's claims need all of its headways. r157: the minimum following distance of UN R157, 5.2.3.3, for the
     /// ego's speed; a list may contain it. observed: each scenario starts from its recorded gap, and a density draws
     /// the headway as one more parameter; it cannot be combined with other headways.
-    #[arg(long, value_name = "LIST", default_value = "paper", help_heading = "Scenario")]
-    thw: String,
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "paper", help_heading = "Scenario")]
+    thw: Vec<String>,
 }
-
-from_arguments!(HeadwaysFlag { thw });
 
 impl HeadwaysFlag {
     /// The headways in the given order.
@@ -122,10 +113,10 @@ impl HeadwaysFlag {
     /// # Errors
     /// As [`headways`].
     pub(super) fn list(&self) -> Result<Vec<Headway>> {
-        match self.thw.trim() {
-            "paper" => Ok(Headway::paper()),
-            text if Headway::parse(text) == Some(Headway::Observed) => Ok(vec![Headway::Observed]),
-            list => headways(list, "`paper` or `observed`"),
+        match &self.thw[..] {
+            [one] if one.trim() == "paper" => Ok(Headway::paper()),
+            [one] if Headway::parse(one.trim()) == Some(Headway::Observed) => Ok(vec![Headway::Observed]),
+            list => headways(list),
         }
     }
 }
@@ -142,8 +133,6 @@ pub(super) struct CriterionFlag {
     #[arg(long, value_name = "collision|ttc|btn", default_value = "collision", help_heading = "Models and criteria")]
     criterion: String,
 }
-
-from_arguments!(CriterionFlag { criterion });
 
 impl CriterionFlag {
     /// The criterion.
@@ -176,8 +165,6 @@ pub(super) struct ExposureFlags {
     #[arg(long, value_name = "km", help_heading = "Data")]
     km: Option<f64>,
 }
-
-from_arguments!(ExposureFlags { hours, km });
 
 impl ExposureFlags {
     /// The given exposure, checked.
@@ -215,12 +202,12 @@ pub(super) fn models<'a>(list: impl IntoIterator<Item = &'a str>, flag: &str) ->
     Ok(if named.is_empty() { ModelId::ALL.to_vec() } else { named.into_iter().map(|(model, _)| model).collect() })
 }
 
-/// Parses the headways of `--thw`, s. `words` are the flag's other values, for the message.
+/// Parses the headways of `--thw`, s.
 ///
 /// # Errors
 /// [`Error::Usage`] for a value that is not above 0, or a repeated value.
-pub(super) fn headways(list: &str, words: &str) -> Result<Vec<Headway>> {
-    let parse = |text: &str| {
+pub(super) fn headways(list: &[String]) -> Result<Vec<Headway>> {
+    let parse = |text: &String| {
         if Headway::parse(text.trim()) == Some(Headway::MinFollowing) {
             return Ok(Headway::MinFollowing);
         }
@@ -230,18 +217,18 @@ pub(super) fn headways(list: &str, words: &str) -> Result<Vec<Headway>> {
         }
         value.map(Headway::thw).ok_or_else(|| {
             let problem = format!("`{text}` is not a time headway");
-            let help = format!("give seconds above 0 with commas, `r157`, {words}");
+            let help = "give seconds above 0 with commas, `r157`, `paper` or `observed`";
             Error::usage(Place::item("--thw"), problem, help)
         })
     };
-    if list.split(',').any(|text| Headway::parse(text.trim()) == Some(Headway::Observed)) {
+    if list.iter().any(|text| Headway::parse(text.trim()) == Some(Headway::Observed)) {
         let problem =
             "`observed` starts each scenario from its recorded gap and cannot be combined with other headways";
         return Err(Error::usage(Place::item("--thw"), problem, "give `observed`, or a list of headways without it"));
     }
-    let found = list.split(',').map(parse).collect::<Result<Vec<_>>>()?;
+    let found = list.iter().map(parse).collect::<Result<Vec<_>>>()?;
     let meanings = found.iter().map(|headway| headway.identity());
-    refuse_repeats(|| Place::item("--thw"), meanings.zip(list.split(',').map(str::trim)))?;
+    refuse_repeats(|| Place::item("--thw"), meanings.zip(list.iter().map(|text| text.trim())))?;
     Ok(found)
 }
 

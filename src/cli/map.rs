@@ -5,7 +5,6 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::console::Total;
 use super::format::FormatFlag;
@@ -19,7 +18,7 @@ use lanesweep_report::host::{Host, SweepRecord};
 use lanesweep_report::map::MapReport;
 use lanesweep_run::grid::{self, Grid, GridText, MapGrids, MapOptions, MapResult, PARAMETERS, presets::Presets};
 use lanesweep_support::readable::{count, value};
-use lanesweep_support::run_folder::{MAP_RECORD, RunFolder};
+use lanesweep_support::run_folder::RunFolder;
 use lanesweep_support::{Error, Place, Result};
 
 /// Seed of the random selection of device lanes that the CPU recomputes.
@@ -71,11 +70,6 @@ pub(super) struct Map {
     out: PathBuf,
 }
 
-from_arguments!(
-    Map { category, preset, x, y, panel, set, robust, out }
-    groups { models, criterion, plausibility, format }
-);
-
 const EXAMPLES: &str = "Examples (--help has the parameters and more):\n  \
                         lanesweep map cut-in --preset jrc --out maps\n  \
                         lanesweep map lvd --x deceleration_mps2=1..9/0.25 --y ego_speed_kmh=30..130/5 --set thw_s=1.2";
@@ -107,7 +101,7 @@ impl Map {
         let map = grid::Map::plan(options, &profile)?;
         let plan_s = started.elapsed().as_secs_f64();
         let opened = configured.open_in(configured.settings.map.reference)?;
-        let folder = RunFolder::open(&self.out, MAP_RECORD)?;
+        let folder = RunFolder::open(&self.out, "map.json")?;
         let executor = opened.executor().with_recheck(RECHECK_SEED);
         let (units, started) = (Total::Exact(map.unit_count()), Instant::now());
         let MapResult { grids, summary } =

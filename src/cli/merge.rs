@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::format::FormatFlag;
 use super::sample_options::guard;
@@ -37,8 +36,6 @@ pub(super) struct Merge {
     #[command(flatten)]
     format: FormatFlag,
 }
-
-from_arguments!(Merge { folder, failures } groups { format });
 
 impl Merge {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::source::{self, PlausibilityFlag, PresetFlag};
 use super::{Exit, Output, console};
@@ -38,8 +37,6 @@ pub(super) struct Mine {
     #[command(flatten)]
     plausibility: PlausibilityFlag,
 }
-
-from_arguments!(Mine { recordings, out, kept } groups { preset, plausibility });
 
 /// Prevents a second process from writing the same file and its provenance file.
 fn lock_of(path: &Path) -> Result<FolderLock> {

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::arguments::from_arguments;
 use super::format::FormatFlag;
 use super::lists;
 use super::shard_flags::ShardFlags;
@@ -44,8 +43,8 @@ pub(crate) struct Sample {
     ///
     /// paper is 2.0, 1.8, … 0.2. observed (or sampled): the headway is drawn from the recorded ones, as a parameter of
     /// the density, which needs `fit --with-thw`.
-    #[arg(long, value_name = "LIST", help_heading = "Scenario")]
-    thw: Option<String>,
+    #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Scenario")]
+    thw: Vec<String>,
     /// Also write one row per lane: .csv, .jsonl or .parquet
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub(super) rows: Option<PathBuf>,
@@ -73,12 +72,6 @@ pub(crate) struct Sample {
     pub(super) settings: SampleSettings,
 }
 
-from_arguments!(
-    Sample { density, thw, rows, failures, proposal, out }
-    groups { models, plausibility, format, shards }
-    others { settings: SampleSettings::default() }
-);
-
 impl Sample {
     pub(super) fn is_crude(&self) -> bool {
         self.settings.estimator != EstimatorKind::Is && self.proposal.is_empty()
@@ -99,11 +92,11 @@ impl Sample {
     }
 
     pub(super) fn headways(&self, density: &DensityModel) -> Result<SampleHeadways> {
-        match self.thw.as_deref().map(str::trim) {
-            Some("sampled" | "observed") => Ok(SampleHeadways::Sampled),
-            None if density.space.has_thw() => Ok(SampleHeadways::Sampled),
-            None | Some("paper") => Ok(SampleHeadways::Each(Headway::paper())),
-            Some(list) => Ok(SampleHeadways::Each(lists::headways(list, "`paper` or `observed`")?)),
+        match &self.thw.iter().map(|text| text.trim()).collect::<Vec<_>>()[..] {
+            ["sampled" | "observed"] => Ok(SampleHeadways::Sampled),
+            [] if density.space.has_thw() => Ok(SampleHeadways::Sampled),
+            [] | ["paper"] => Ok(SampleHeadways::Each(Headway::paper())),
+            _ => Ok(SampleHeadways::Each(lists::headways(&self.thw)?)),
         }
     }
 }

@@ -18,7 +18,7 @@ use lanesweep_stats::estimate::{Search, StopRule};
 use lanesweep_support::atomic_file::StagedFile;
 use lanesweep_support::files::check_folder;
 use lanesweep_support::readable::{count, counted, duration};
-use lanesweep_support::run_folder::{ESTIMATE_RECORD, RunFolder};
+use lanesweep_support::run_folder::RunFolder;
 use lanesweep_support::table::TableWriter;
 use lanesweep_support::{Error, Place, Result};
 
@@ -78,7 +78,7 @@ impl Sample {
         let density = read_density(density)?;
         match self.shards.plan_only || self.shards.is_part() {
             true => check_folder(&self.out)?,
-            false => drop(RunFolder::open(&self.out, ESTIMATE_RECORD)?),
+            false => drop(RunFolder::open(&self.out, sampling::ESTIMATE_RECORD)?),
         }
         let profile = configured.profile()?;
         let options = self.options(&density)?;
@@ -104,7 +104,7 @@ impl Sample {
             SampleKind::Search(search) => {
                 let units = Total::AtMost(warn_of_long(&sample, &search));
                 // The search is kept in the folder, so it needs the folder's lock too.
-                let _folder = (!is_split).then(|| RunFolder::open(&self.out, ESTIMATE_RECORD)).transpose()?;
+                let _folder = (!is_split).then(|| RunFolder::open(&self.out, sampling::ESTIMATE_RECORD)).transpose()?;
                 let found = configured.with_progress(units, "searching", executor, |executor| {
                     sample.searched(executor, &self.out, is_split)
                 })?;

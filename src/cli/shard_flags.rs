@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::arguments::from_arguments;
 use lanesweep_run::parts::Shard;
 
 /// Flags of every verb that can be split.
@@ -22,8 +21,6 @@ pub(super) struct ShardFlags {
     #[arg(long, conflicts_with = "shard", help_heading = "Run", hide_short_help = true)]
     pub plan_only: bool,
 }
-
-from_arguments!(ShardFlags { plan, plan_only } parsed { shard: str::parse });
 
 impl ShardFlags {
     /// Whether this is a part of a run, to be merged with others.

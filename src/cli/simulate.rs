@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::arguments::from_arguments;
 use super::case_flags::{CaseFlags, GivenCase, from_table, from_toml, time_s};
 use super::configured::Configured;
 use super::console::{self, Verbosity};
@@ -41,18 +40,18 @@ pub(super) struct Simulate {
     #[arg(long, value_name = "FILE", help_heading = "Data")]
     table: Option<PathBuf>,
     /// Row of the table, from 1 after the header; needed if it has several
-    #[arg(long, value_name = "N", help_heading = "Data")]
+    #[arg(long, value_name = "N", requires = "table", help_heading = "Data")]
     row: Option<usize>,
     /// Scenario file (.jsonl, .parquet, .csv) for --lane
     ///
     /// With --from a study and --xosc: the study's scenarios, for sizes, side and lane width.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["case_file", "table"], help_heading = "Data")]
+    #[arg(long, value_name = "FILE", requires = "lane", conflicts_with_all = ["case_file", "table"], help_heading = "Data")]
     scenarios: Option<PathBuf>,
     /// Folder (--out) of a study or sample, for --lane
     ///
     /// Repeats that lane with the run's profile and options, bit for bit, and reports whether f64 gives another
     /// outcome.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["case_file", "table", "profile", "dt"], help_heading = "Data")]
+    #[arg(long, value_name = "DIR", requires = "lane", conflicts_with_all = ["case_file", "table", "profile", "dt"], help_heading = "Data")]
     from: Option<PathBuf>,
     /// Lane key: scenario/variant/headway/model; repeatable
     #[arg(long, value_name = "KEY", help_heading = "Data")]
@@ -60,7 +59,7 @@ pub(super) struct Simulate {
     /// Also simulate other variants of the lane's scenario
     ///
     /// S (the recorded scenario; the default without a value), keys of parameterizations, or all.
-    #[arg(long, value_name = "VARIANTS", value_delimiter = ',', num_args = 0..=1, default_missing_value = "S", help_heading = "Scenario")]
+    #[arg(long, value_name = "VARIANTS", requires = "lane", value_delimiter = ',', num_args = 0..=1, default_missing_value = "S", help_heading = "Scenario")]
     compare: Vec<String>,
     /// Also draw the time series
     ///
@@ -68,7 +67,7 @@ pub(super) struct Simulate {
     #[arg(long, value_name = "FILE.svg", help_heading = "Output")]
     plot: Option<PathBuf>,
     /// End of the figure's time axis [default: 2 s after the last change]
-    #[arg(long, value_name = "s", value_parser = time_s, help_heading = "Output", hide_short_help = true)]
+    #[arg(long, value_name = "s", requires = "plot", value_parser = time_s, help_heading = "Output", hide_short_help = true)]
     plot_end: Option<f64>,
     #[command(flatten)]
     xosc: XoscFlags,
@@ -77,12 +76,6 @@ pub(super) struct Simulate {
     #[command(flatten)]
     format: FormatFlag,
 }
-
-from_arguments!(
-    Simulate { case_file, table, row, scenarios, from, lane, compare, plot }
-    parsed { plot_end: time_s }
-    groups { case, xosc, plausibility, format }
-);
 
 impl Simulate {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use indicatif::ProgressBar;
 
-use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::console::{self, Total};
 use super::signals::CANCEL;
@@ -68,8 +67,6 @@ pub(super) struct PlausibilityFlag {
     accept_implausible: bool,
 }
 
-from_arguments!(PlausibilityFlag { accept_implausible });
-
 impl PlausibilityFlag {
     /// The policy for readers.
     pub(super) fn policy(self) -> Implausible {
@@ -81,11 +78,9 @@ impl PlausibilityFlag {
 #[derive(Debug, Clone, Args)]
 pub(super) struct PresetFlag {
     /// Format of the recordings: exid, sumo-fcd, … or a TOML file [default: detected]
-    #[arg(long, value_name = "NAME|FILE", help_heading = "Data", hide_short_help = true)]
+    #[arg(long, value_name = "NAME|FILE", requires = "recordings", help_heading = "Data", hide_short_help = true)]
     pub preset: Option<String>,
 }
-
-from_arguments!(PresetFlag { preset });
 
 /// Where a verb's data come from.
 #[derive(Debug, Clone, Args)]
@@ -106,8 +101,6 @@ pub(super) struct SourceFlags {
     #[command(flatten)]
     plausibility: PlausibilityFlag,
 }
-
-from_arguments!(SourceFlags { recordings, scenarios, filter } groups { preset, plausibility });
 
 impl SourceFlags {
     /// The named source; the generator if none is named.

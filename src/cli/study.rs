@@ -5,7 +5,6 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::console::{self, Total};
 use super::format::FormatFlag;
@@ -22,7 +21,7 @@ use lanesweep_run::study::{self, ExternalReplay, ReferenceComparison, StudyOptio
 use lanesweep_support::files::{check_folder, check_output};
 use lanesweep_support::input_file;
 use lanesweep_support::readable;
-use lanesweep_support::run_folder::{Results, RunFolder, STUDY_RECORD};
+use lanesweep_support::run_folder::{Results, RunFolder};
 use lanesweep_support::{Error, Place, Result};
 use lanesweep_traffic::Source;
 
@@ -77,16 +76,12 @@ pub(super) struct Study {
     shards: ShardFlags,
 }
 
-from_arguments!(
-    Study { out, rows, published, cross_validate, external }
-    groups { data, categories, models, headways, format, shards }
-);
 impl Study {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         self.guard_inputs(configured)?;
         match self.shards.plan_only || self.shards.is_part() {
             true => check_folder(&self.out)?,
-            false => drop(RunFolder::open(&self.out, STUDY_RECORD)?),
+            false => drop(RunFolder::open(&self.out, study::STUDY_RECORD)?),
         }
         let is_binary64 = configured.settings.study.reference;
         if let Some(path) = &self.shards.plan {
@@ -139,16 +134,12 @@ impl Study {
             )?);
         }
         let data = source.describe(collection.synthetic);
-        let builder = study::Study::builder(&collection, profile)
-            .options(options)
-            .mining(config.mining)
-            .score(config.score)
-            .data(data)
-            .scenario_file_sha256(self.data.scenarios.as_deref().map(input_file::sha256).transpose()?)
-            // Synthetic recordings are calibrated to the published numbers, so both are shown if the headways are the
-            // same.
-            .published(self.published || (collection.synthetic && has_paper_headways))
-            .reference(config.study.reference);
+        let mut builder = study::Study::builder(&collection, profile);
+        (builder.options, builder.mining, builder.score, builder.data) = (options, config.mining, config.score, data);
+        builder.scenario_file_sha256 = self.data.scenarios.as_deref().map(input_file::sha256).transpose()?;
+        // Synthetic recordings are calibrated to the published numbers, so both are shown if the headways are the same.
+        builder.published = self.published || (collection.synthetic && has_paper_headways);
+        builder.reference = config.study.reference;
         let study = timed(&mut timings.plan_s, || builder.plan())?;
         console::warn(study.cases().left_out());
         Ok((study, timings))

@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Serialize;
 
-use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::console::Total;
 use super::format::FormatFlag;
@@ -42,10 +41,10 @@ pub(super) struct Tracks {
     #[arg(value_name = "PATH", help_heading = "Data")]
     paths: Vec<PathBuf>,
     /// Format of the files: exid, sumo-fcd, … or a TOML file [default: detected]
-    #[arg(long, value_name = "NAME|FILE", help_heading = "Data")]
+    #[arg(long, value_name = "NAME|FILE", requires = "paths", help_heading = "Data")]
     preset: Option<String>,
     /// Folder for tracks.json and a figure of each recording: positions across the road
-    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    #[arg(long, value_name = "DIR", requires = "paths", help_heading = "Output")]
     out: Option<PathBuf>,
     /// Write the tracks in highD's format into this folder, or as one table: .csv, .parquet
     #[arg(long, value_name = "DIR|FILE", help_heading = "Output")]
@@ -53,8 +52,6 @@ pub(super) struct Tracks {
     #[command(flatten)]
     format: FormatFlag,
 }
-
-from_arguments!(Tracks { paths, preset, out, convert } groups { format });
 
 impl Tracks {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {

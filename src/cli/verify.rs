@@ -28,13 +28,23 @@ pub(super) struct Verify {
     #[command(flatten)]
     data: SourceFlags,
     /// Random lanes per model and category
-    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = super::arguments::whole::<u64>, help_heading = "Models and criteria")]
+    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = whole, help_heading = "Models and criteria")]
     random_lanes: u64,
     /// Seed of the random lanes and of those on thresholds
     #[arg(long, value_name = "N", default_value_t = 157, help_heading = "Run")]
     seed: u64,
     #[command(flatten)]
     format: FormatFlag,
+}
+
+/// Parses an integer as in the configuration: `10000`, `10_000` or `1e4`.
+fn whole(text: &str) -> std::result::Result<u64, String> {
+    let plain = text.replace('_', "");
+    // Above 2^53 a floating-point number no longer identifies one integer.
+    let of_power = |value: &f64| value.fract() == 0.0 && (0.0..9e15).contains(value);
+    let power = || plain.parse().ok().filter(of_power).map(|value| value as u64);
+    let found = plain.parse().ok().or_else(power);
+    found.ok_or_else(|| "write a whole number such as 10000, 10_000 or 1e4".to_owned())
 }
 
 /// Maximum number of random lanes per model and category: their units have individual names.

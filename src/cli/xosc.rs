@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::arguments::{choices, from_arguments};
 use super::case_flags::time_s;
 use lanesweep_engine::LaneKey;
 use lanesweep_model::scenario::{Scenario, Side};
@@ -24,18 +23,15 @@ pub(super) struct XoscFlags {
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     xosc: Option<PathBuf>,
     /// Driver of the ego in --xosc
-    #[arg(long, value_enum, default_value_t, help_heading = "Output", hide_short_help = true)]
+    #[arg(long, value_enum, default_value_t, requires = "xosc", help_heading = "Output", hide_short_help = true)]
     ego: EgoFlag,
     /// End of the scenario with --ego external [default: 10 s after the lane's last event and end]
-    #[arg(long, value_name = "s", value_parser = time_s, help_heading = "Output", hide_short_help = true)]
+    #[arg(long, value_name = "s", requires = "xosc", value_parser = time_s, help_heading = "Output", hide_short_help = true)]
     duration: Option<f64>,
     /// Side in --xosc that the other vehicle comes from or leaves to [default: the scenario's, else left]
-    #[arg(long, value_enum, help_heading = "Output", hide_short_help = true)]
+    #[arg(long, value_enum, requires = "xosc", help_heading = "Output", hide_short_help = true)]
     side: Option<SideFlag>,
 }
-
-from_arguments!(XoscFlags { xosc, ego, side } parsed { duration: time_s });
-choices!(EgoFlag, SideFlag);
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
 enum EgoFlag {

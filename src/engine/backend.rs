@@ -42,7 +42,7 @@ impl Chunk {
     }
 
     /// Verdicts of a lane, by its place in the chunk.
-    pub fn verdicts_of(&self, at: usize) -> Verdicts {
+    pub(crate) fn verdicts_of(&self, at: usize) -> Verdicts {
         match &self.counted {
             Some(counted) => counted.verdicts(at),
             None => self.verdicts[at],

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// A device as a user names it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -83,7 +83,7 @@ impl FromStr for BackendChoice {
             _ => Err(Error::usage(
                 Place::option("backend"),
                 format!("there is no backend `{text}`"),
-                "write auto, cpu or gpu; a certain device: option `device`, see `lanesweep devices`",
+                format!("write auto, cpu or gpu; a certain device: {}, see `lanesweep devices`", option("device")),
             )),
         }
     }
@@ -98,7 +98,7 @@ impl BackendChoice {
         match (self, device) {
             (BackendChoice::Cpu, Some(device)) => Err(Error::usage(
                 Place::option("device"),
-                format!("`{device}` is named, but option `backend = cpu` uses no device"),
+                format!("`{device}` is named, but {} uses no device", option("backend = cpu")),
                 "leave out one of the two",
             )),
             _ => Ok(()),

@@ -12,7 +12,7 @@ use lanesweep_model::scalar::Real;
 use lanesweep_model::scenario::{
     Case, Category, LATERAL_SAMPLED, Lateral, Motion, Participant, SPEED_SAMPLED, Speed, Tables,
 };
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// One other vehicle of a lane.
 #[repr(C)]
@@ -258,7 +258,7 @@ pub fn check_time_step(case: &LaneCase<f64>, tables: &Tables<f64>, dt_s: f64, pl
         return Err(Error::usage(
             place(),
             format!("{which} passes from one side of the ego to the other ({across_m:.1} m) within a step of {dt_s} s"),
-            format!("use a time step (option `dt`) below {longest_s:.2e} s, or check the lateral positions"),
+            format!("use a time step ({}) below {longest_s:.2e} s, or check the lateral positions", option("dt")),
         ));
     }
     Ok(())

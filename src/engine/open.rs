@@ -8,7 +8,7 @@ use super::cpu::backend::CpuBackend;
 use super::device_choice::{BackendChoice, DeviceName};
 use super::executor::Executor;
 use lanesweep_support::cancel::Cancel;
-use lanesweep_support::{Error, Result};
+use lanesweep_support::{Error, Result, option};
 
 /// A device that computes lanes.
 #[derive(Debug, Clone, Serialize)]
@@ -121,7 +121,7 @@ fn checked(gpu: super::gpu::GpuBackend) -> Result<super::gpu::GpuBackend> {
         if check.differing > 0 {
             let problem =
                 format!("{} of {} lanes of the self-check differ from the CPU's", check.differing, check.lanes);
-            let help = "use option `backend = cpu`, or the device through Vulkan";
+            let help = format!("use {}, or the device through Vulkan", option("backend = cpu"));
             return Err(Error::device(&gpu.card().name, problem, help));
         }
     }
@@ -131,8 +131,12 @@ fn checked(gpu: super::gpu::GpuBackend) -> Result<super::gpu::GpuBackend> {
 #[cfg(feature = "gpu")]
 fn nothing_to_verify() -> Error {
     let problem = "it compares a device with the CPU, and there is no GPU that it may use";
-    let help = "name a device with option `device` (`lanesweep devices` lists them), such as option `device = \
-                llvmpipe`; option `backend = cpu` compares the CPU's vector instructions with its scalar code";
+    let help = format!(
+        "name a device with {} (`lanesweep devices` lists them), such as {}; {} compares the CPU's vector instructions with its scalar code",
+        option("device"),
+        option("device = llvmpipe"),
+        option("backend = cpu")
+    );
     Error::device("lanesweep verify", problem, help)
 }
 
@@ -140,8 +144,8 @@ fn nothing_to_verify() -> Error {
 fn open_device(choice: BackendChoice, device: Option<&DeviceName>, _: bool) -> Result<Option<OpenBackend>> {
     choice.check(device)?;
     match (choice, device) {
-        (BackendChoice::Gpu, _) => Err(no_gpu("option `backend = gpu`")),
-        (_, Some(device)) => Err(no_gpu(&format!("option `device = {device}`"))),
+        (BackendChoice::Gpu, _) => Err(no_gpu(&option("backend = gpu"))),
+        (_, Some(device)) => Err(no_gpu(&option(&format!("device = {device}")))),
         (_, None) => Ok(None),
     }
 }
@@ -154,6 +158,6 @@ fn nothing_to_verify() -> Error {
 /// The error of a program without GPU support if a GPU is required.
 #[cfg(not(feature = "gpu"))]
 pub fn no_gpu(requested: &str) -> Error {
-    let help = "use option `backend = cpu`, or build it with the feature `gpu`";
+    let help = format!("use {}, or build it with the feature `gpu`", option("backend = cpu"));
     Error::device(requested, "this program was built without the feature `gpu`", help)
 }

@@ -144,6 +144,22 @@ pub trait CaseSource: Send + Sync {
     }
 }
 
+impl CaseSource for Generator {
+    fn case(&self, _block: usize, unit: u64, _variant: usize) -> LaneCase<f64> {
+        // Only for callers that need no series: the tables are discarded.
+        Generator::case(self, unit, &mut Tables::default())
+    }
+
+    fn tables(&self) -> &Tables<f64> {
+        static NONE: Tables<f64> = Tables { speed: Vec::new(), lateral: Vec::new() };
+        &NONE
+    }
+
+    fn generator(&self) -> Option<&Generator> {
+        Some(self)
+    }
+}
+
 /// One category's part of the plan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Block {

@@ -10,7 +10,7 @@ use super::cpu::runner::LaneRunner;
 use super::cpu::simd::Instructions;
 use super::outcome::{Outcome, Verdicts};
 use super::plan::{LaneKey, LanePlan};
-use lanesweep_support::{Error, Result};
+use lanesweep_support::{Error, Result, option};
 
 /// Default sampling rate: one lane in 1000 is rechecked.
 const ONE_IN: u64 = 1000;
@@ -154,7 +154,8 @@ impl<'p> Recheck<'p> {
             ),
             RecheckBy::Nothing | RecheckBy::Lanes => format!(
                 "lane {lane}: {backend} says {found}, the CPU {expected}. Nothing that this device computed can be \
-                 trusted; `lanesweep verify` tells how often it errs, option `backend = cpu` computes without it"
+                 trusted; `lanesweep verify` tells how often it errs, {} computes without it",
+                option("backend = cpu")
             ),
         })
     }

@@ -5,8 +5,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::profile::Profile;
-use lanesweep_support::Place;
-use lanesweep_support::input_file;
+use lanesweep_support::{Place, input_file};
 
 const CONSTANTS: &str = include_str!("../../configs/constants.toml");
 

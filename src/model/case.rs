@@ -217,18 +217,6 @@ impl PlainCase {
     }
 }
 
-/// The first missing parameter that the category needs, by the name of its `simulate` flag.
-pub fn missing_parameter(category: Category, has: impl Fn(&str) -> bool) -> Option<&'static str> {
-    let changes_lane = category != Category::Lvd;
-    let needs = [
-        ("ego_speed", true),
-        ("lateral_speed", changes_lane),
-        ("acceleration", !changes_lane),
-        ("ahead_gap", category == Category::CutOut),
-    ];
-    needs.into_iter().find(|(key, is_needed)| *is_needed && !has(key)).map(|(key, _)| key)
-}
-
 /// Refuses a time headway for an ego at rest, because it defines no distance.
 ///
 /// # Errors

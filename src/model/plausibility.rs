@@ -4,6 +4,10 @@
 //! A value outside the plausible range is used and reported. One outside the physical range is refused, unless the user
 //! accepts implausible input; then it is reported too. Readers themselves refuse values that no arithmetic can hold.
 
+use std::sync::LazyLock;
+
+use lanesweep_support::option;
+
 /// Quantity of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs)] // the table below
@@ -71,7 +75,8 @@ pub const LIMITS: [Limits; 10] = [
 pub const NOISE_MPS: f64 = -0.5;
 
 /// What a user can do about a refused value.
-pub const HELP: &str = "correct the value or its unit; option `accept_implausible` uses it as it is";
+pub static HELP: LazyLock<String> =
+    LazyLock::new(|| format!("correct the value or its unit; {} uses it as it is", option("accept_implausible")));
 
 /// Policy for values outside the physical range.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -215,39 +220,5 @@ impl Doubts {
             list.push(format!("an implausible {} is used as it is, {}: {first}", of.name, times(*count)));
         }
         list
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn kilometres_per_hour_for_metres_per_second_are_refused_by_name_and_accepted_on_request() {
-        let mut doubts = Doubts::default();
-        let text = doubts.check(Quantity::Speed, 108.0, String::new).unwrap_err();
-        assert_eq!(text, "108 m/s is beyond what is physical for a speed (0 to 100 m/s); 108 looks like km/h: 30 m/s");
-        assert!(doubts.sentences().is_empty());
-        let mut doubts = Doubts::new(Implausible::Accepted);
-        doubts.check(Quantity::Speed, 108.0, || "line 2".to_owned()).unwrap();
-        doubts.check(Quantity::Speed, 90.0, || "line 3".to_owned()).unwrap();
-        let [said] = &doubts.sentences()[..] else { panic!("one sentence") };
-        assert!(said.contains("2 times, first: line 2: 108 m/s"), "{said}");
-    }
-
-    #[test]
-    fn noise_of_a_standing_vehicle_is_0_and_a_vehicle_that_reverses_is_not() {
-        let mut doubts = Doubts::default();
-        let speeds = [-0.499, -0.01, -0.0, 0.0, -0.5, -3.0].map(|v| doubts.speed(v, || "here".to_owned()));
-        assert_eq!(speeds, [0.0, 0.0, 0.0, 0.0, -0.5, -3.0]);
-        assert_eq!(doubts.sentences(), ["a speed between -0.5 and 0 m/s is taken as 0, 2 times, first: here"]);
-    }
-
-    #[test]
-    fn the_table_is_in_the_order_of_the_quantities_and_every_plausible_value_is_physical() {
-        for (at, of) in LIMITS.iter().enumerate() {
-            assert_eq!(of.quantity as usize, at);
-            assert!(of.physical.0 <= of.plausible.0 && of.plausible.1 <= of.physical.1, "{}", of.name);
-        }
     }
 }

@@ -8,10 +8,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::criterion::CriteriaProfile;
 use crate::driver::{self, Bound, DriverProfile, ModelId};
-use lanesweep_support::input_file;
 use lanesweep_support::plain_text::nearest;
 use lanesweep_support::ranges::refuse_repeats;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, input_file, option};
 
 /// Maximum number of steps of a run.
 pub const MAX_STEPS: f64 = 4e6;
@@ -250,7 +249,8 @@ impl Profile {
             Place::item("`frame.dt_s`"),
             format!("a time step of {} s is too long: `{key}` allows {longest_s} s", self.frame.dt_s),
             format!(
-                "use a time step (option `dt`) of at most {longest_s} s, or leave out the driver model that needs it"
+                "use a time step ({}) of at most {longest_s} s, or leave out the driver model that needs it",
+                option("dt")
             ),
         ))
     }

@@ -53,38 +53,3 @@ impl Stream {
 pub fn choose(word: u32, count: u32) -> u32 {
     wide_product(word, count)[0]
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_known_answers_of_random123() {
-        // From Random123's file of known answers: philox4x32 with 10 rounds.
-        let known = [
-            ([0; 4], [0; 2], [0x6627_e8d5, 0xe169_c58d, 0xbc57_ac4c, 0x9b00_dbd8]),
-            ([u32::MAX; 4], [u32::MAX; 2], [0x408f_276d, 0x41c8_3b0e, 0xa20b_c7c6, 0x6d54_51fd]),
-            (
-                [0x243f_6a88, 0x85a3_08d3, 0x1319_8a2e, 0x0370_7344],
-                [0xa409_3822, 0x299f_31d0],
-                [0xd16c_fe09, 0x94fd_cceb, 0x5001_e420, 0x2412_6ea1],
-            ),
-        ];
-        for (counter, key, words) in known {
-            assert_eq!(philox4x32_10(counter, key), words);
-        }
-    }
-
-    #[test]
-    fn choices_are_in_range_and_even() {
-        for count in [1, 2, 3, 7, 1000, u32::MAX] {
-            assert_eq!(choose(0, count), 0);
-            assert_eq!(choose(u32::MAX, count), count - 1);
-        }
-        assert_eq!(choose(u32::MAX, 0), 0);
-        // The words that give k are those in [k·2³²/count, (k + 1)·2³²/count): their number differs by one at most.
-        let mut held = [0; 7];
-        (0..=u32::MAX).step_by(1 << 12).for_each(|word| held[choose(word, 7) as usize] += 1);
-        assert!(held.iter().all(|n| (149_796..=149_797).contains(n)), "{held:?}");
-    }
-}

@@ -1,12 +1,13 @@
 //! What a case sheet rests on: identity with hashes, assumptions, and the effect of the time step.
 
-use serde_json::{Map, Value, json};
+use serde::Serialize;
+use serde_json::{Map, Value};
 
 use super::case_identity::{CaseIdentity, profile_sha256, program};
 use super::case_sheet::{CaseSheet, signed};
 use super::html::Section;
-use super::lanes::outcome_json;
-use super::records;
+use super::lanes::outcome_record;
+use super::records::{self, record};
 use super::tables::{WIDTH, wrap};
 use lanesweep_engine::version::Canonical;
 use lanesweep_engine::{ENGINE_VERSION, Outcome};
@@ -24,8 +25,8 @@ impl CaseSheet<'_> {
         let point = self.subject.point();
         let is_si = PARAMETERS.iter().filter(|parameter| parameter.per_si == 1.0 && !parameter.is_relative);
         is_si
-            .filter_map(|parameter| Some((parameter.key.to_owned(), json!(point.get(parameter.quantity)?))))
-            .chain(self.subject.duration_s().map(|duration_s| ("duration_s".to_owned(), json!(duration_s))))
+            .filter_map(|parameter| Some((parameter.key.to_owned(), Value::from(point.get(parameter.quantity)?))))
+            .chain(self.subject.duration_s().map(|duration_s| ("duration_s".to_owned(), Value::from(duration_s))))
             .collect()
     }
 
@@ -72,17 +73,17 @@ impl CaseSheet<'_> {
     ///
     /// # Errors
     /// None for a sheet of this program.
-    pub(super) fn identity_json(&self) -> Result<Value> {
+    pub(super) fn identity_record(&self) -> Result<impl Serialize> {
         let CaseIdentity { commit, file_sha256, date, author } = &self.identity;
-        Ok(json!({
-            "commit": (!commit.is_empty()).then_some(commit),
-            "engine_version": ENGINE_VERSION,
-            "case_sha256": self.case_sha256()?,
-            "file_sha256": file_sha256,
-            "command": self.command,
-            "date": date,
-            "author": author,
-        }))
+        Ok(record! {
+            author: author,
+            case_sha256: self.case_sha256()?,
+            command: &self.command,
+            commit: (!commit.is_empty()).then_some(commit),
+            date: date,
+            engine_version: ENGINE_VERSION,
+            file_sha256: file_sha256,
+        })
     }
 
     /// The identity as the first chapter of the page.
@@ -153,17 +154,17 @@ impl CaseSheet<'_> {
     }
 
     /// The runs with a tenth of the time step for programs; null without them.
-    pub(super) fn finer_json(judgement: &Judgement) -> Value {
-        let Some(finer) = &judgement.finer else { return Value::Null };
+    pub(super) fn finer_record(judgement: &Judgement) -> Option<impl Serialize + use<>> {
+        let finer = judgement.finer.as_ref()?;
         let models = judgement.models.iter().zip(&finer.outcomes).map(|(judged, outcome)| {
-            let mut outcome = outcome_json(outcome, finer.dt_s);
-            outcome["model"] = json!(judged.trace.model.name());
+            let mut outcome = outcome_record(outcome, finer.dt_s);
+            outcome.insert("model".to_owned(), judged.trace.model.name().into());
             outcome
         });
-        json!({
-            "dt_s": finer.dt_s,
-            "changes_answer": judgement.turns_with_a_finer_step(),
-            "models": models.collect::<Vec<_>>(),
+        Some(record! {
+            changes_answer: judgement.turns_with_a_finer_step(),
+            dt_s: finer.dt_s,
+            models: models.collect::<Vec<_>>(),
         })
     }
 }

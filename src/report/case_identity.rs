@@ -82,16 +82,3 @@ pub(super) fn profile_sha256(profile: &Profile) -> Result<String> {
     canonical.value(profile)?;
     Ok(canonical.finish())
 }
-
-#[cfg(test)]
-mod tests {
-    use super::NOT_CONSIDERED;
-
-    #[test]
-    fn the_chapter_for_assessors_lists_what_is_not_considered() {
-        let chapter = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/src/for-assessors.md");
-        let chapter = std::fs::read_to_string(chapter).unwrap();
-        let rows: String = NOT_CONSIDERED.iter().map(|(what, how)| format!("- **{what}**: {how}.\n")).collect();
-        assert!(chapter.contains(&rows), "the chapter needs these rows:\n{rows}");
-    }
-}

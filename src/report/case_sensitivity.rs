@@ -1,9 +1,10 @@
 //! Which driver decides: the verdict of a sheet by rule, reading and profile.
 
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use super::case_sheet::CaseSheet;
 use super::html::Section;
+use super::records::record;
 use super::tables::{WIDTH, wrap};
 use lanesweep_run::check::{DriverRule, RuleVerdicts, Verdict};
 use lanesweep_support::table::Table;
@@ -72,17 +73,18 @@ impl CaseSheet<'_> {
     }
 
     /// The same as records: a row per profile, reading and rule.
-    pub(super) fn by_rule_records(&self) -> Vec<Value> {
+    pub(super) fn by_rule_records(&self) -> Vec<impl Serialize> {
         let in_force = self.first().verdict();
-        let record = |profile: &str, reading, (rule, verdict): &(DriverRule, Verdict)| {
-            json!({
-                "profile": profile, "reading": reading, "rule": rule.label(), "verdict": verdict.label(),
-                "differs": *verdict != in_force,
-            })
+        let all = self.rules().flat_map(|(profile, row)| row.verdicts.iter().map(move |of| (profile, row.reading, of)));
+        let record = |(profile, reading, (rule, verdict)): (&str, Option<&'static str>, &(DriverRule, Verdict))| {
+            record! {
+                differs: *verdict != in_force,
+                profile: profile.to_owned(),
+                reading: reading,
+                rule: rule.label(),
+                verdict: verdict.label(),
+            }
         };
-        let of_row = |(profile, row): (&str, &RuleVerdicts)| {
-            row.verdicts.iter().map(|of| record(profile, row.reading, of)).collect::<Vec<_>>()
-        };
-        self.rules().flat_map(of_row).collect()
+        all.map(record).collect()
     }
 }

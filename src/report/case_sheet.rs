@@ -1,12 +1,14 @@
 //! The sheet of one case against the regulation: the answer, the drivers, the clauses and the distance to the boundary;
 //! as text, as JSON and as a page to print.
 
-use serde_json::{Value, json};
+use std::collections::BTreeMap;
+
+use serde::Serialize;
 
 use super::case_identity::{CaseIdentity, NOT_CONSIDERED, profile_sha256};
 use super::html::{Page, PageFigure, Section};
-use super::lanes::outcome_json;
-use super::records::{self, PROGRAM};
+use super::lanes::outcome_record;
+use super::records::{self, PROGRAM, record};
 use super::tables::{WIDTH, wrap};
 use super::trace::{TraceFigure, TracePanels, TraceSeries};
 use lanesweep_model::driver::ModelId;
@@ -197,75 +199,24 @@ impl CaseSheet<'_> {
     /// # Errors
     /// None for a sheet of this program.
     pub fn json(&self) -> Result<String> {
-        let judgement = |(judgement, profile): (&Judgement, &Profile)| {
-            let models = judgement.models.iter().map(|judged| {
-                let mut outcome = outcome_json(&judged.trace.outcome, judged.trace.dt_s);
-                outcome["model"] = json!(judged.trace.model.name());
-                outcome["braking_s"] = json!(judged.braking_s());
-                outcome["changes_with"] = json!(judged.flips);
-                outcome["is_contact_like"] = json!(judged.touches);
-                outcome
-            });
-            let readings = judgement.readings.iter().map(|reading| {
-                json!({
-                    "clause": reading.clause, "condition": reading.quantity, "unit": reading.unit,
-                    "value": reading.value.map(json_number), "relation": reading.relation.sign(),
-                    "threshold": json_number(reading.threshold),
-                    "t_s": reading.time_s, "holds": reading.holds().label(), "then": reading.then,
-                })
-            });
-            let boundaries = judgement.boundaries.iter().map(|boundary| {
-                let models = ModelId::ALL.iter().zip(&boundary.models);
-                let models: serde_json::Map<String, Value> =
-                    models.map(|(model, at)| (model.name().to_owned(), ends(at))).collect();
-                json!({
-                    "parameter": boundary.parameter.key, "value": boundary.value, "searched": boundary.range,
-                    "answer_changes_at": ends(&boundary.answer),
-                    "answer_becomes": {"below": boundary.becomes[0].map(Verdict::label), "above": boundary.becomes[1].map(Verdict::label)},
-                    "collision_changes_at": models,
-                })
-            });
-            let is_answer = matches!(judgement.verdict(), Verdict::Answer(_) | Verdict::Undecided);
-            json!({
-                "profile": judgement.profile,
-                "sha256": profile_sha256(profile).unwrap_or_default(),
-                "dt_s": profile.frame.dt_s,
-                "time_cap_s": profile.frame.time_cap_s,
-                "finer_step": Self::finer_json(judgement),
-                "verdict": judgement.verdict().label(),
-                "nominal_answer": is_answer.then(|| judgement.verdicts.answer().label()),
-                "clause": judgement.clause,
-                "demanded": judgement.demand(),
-                "demand_changes_with": judgement.demand_flips,
-                "outside_annex_3": judgement.outside_annex,
-                "silent": judgement.silent,
-                "avoided_by": judgement.avoiders().iter().map(|m| m.name()).collect::<Vec<_>>(),
-                "contact_like": judgement.touching.iter().map(|m| m.name()).collect::<Vec<_>>(),
-                "drives_through_s": judgement.drives_through_s,
-                "changes_with": judgement.flips,
-                "models": models.collect::<Vec<_>>(),
-                "clauses": readings.collect::<Vec<_>>(),
-                "boundaries": boundaries.collect::<Vec<_>>(),
-            })
-        };
-        records::document(&json!({
-            "program": PROGRAM,
-            "identity": self.identity_json()?,
-            "data": self.origin,
-            "synthetic": self.is_synthetic,
-            "category": self.subject.category().key(),
-            "case": self.case_numbers(),
-            "verdict": self.first().verdict().label(),
-            "answer": self.answer(),
-            "demand": self.demand(),
-            "silent": self.silent(),
-            "rule": self.rule(),
-            "by_rule": self.by_rule_records(),
-            "cautions": self.cautions(),
-            "profiles": self.judgements.iter().zip(self.profiles).map(judgement).collect::<Vec<_>>(),
-            "assumptions": self.profiles[0].assumptions(),
-            "not_considered": NOT_CONSIDERED.map(|(what, how)| format!("{what}: {how}")),
-        }))
+        records::document(&record! {
+            answer: self.answer(),
+            assumptions: records::sorted(&self.profiles[0].assumptions()),
+            by_rule: self.by_rule_records(),
+            case: self.case_numbers(),
+            category: self.subject.category().key(),
+            cautions: self.cautions(),
+            data: &self.origin,
+            demand: self.demand(),
+            identity: self.identity_record()?,
+            not_considered: NOT_CONSIDERED.map(|(what, how)| format!("{what}: {how}")),
+            profiles: self.judgements.iter().zip(self.profiles).map(judged_record).collect::<Vec<_>>(),
+            program: PROGRAM,
+            rule: self.rule(),
+            silent: self.silent(),
+            synthetic: self.is_synthetic,
+            verdict: self.first().verdict().label(),
+        })
     }
 
     /// The figure of the case under the first profile, step by step, with the answer.
@@ -356,6 +307,66 @@ impl CaseSheet<'_> {
     }
 }
 
+/// What a profile says of the case, for programs.
+fn judged_record<'a>((judgement, profile): (&'a Judgement, &'a Profile)) -> impl Serialize + use<'a> {
+    let names = |models: &[ModelId]| models.iter().map(|model| model.name()).collect::<Vec<_>>();
+    let models = judgement.models.iter().map(|judged| {
+        let mut outcome = outcome_record(&judged.trace.outcome, judged.trace.dt_s);
+        outcome.insert("model".to_owned(), judged.trace.model.name().into());
+        outcome.insert("braking_s".to_owned(), judged.braking_s().into());
+        outcome.insert("changes_with".to_owned(), judged.flips.clone().into());
+        outcome.insert("is_contact_like".to_owned(), judged.touches.into());
+        outcome
+    });
+    let clauses = judgement.readings.iter().map(|reading| {
+        record! {
+            clause: &reading.clause,
+            condition: reading.quantity,
+            holds: reading.holds().label(),
+            relation: reading.relation.sign(),
+            t_s: reading.time_s,
+            then: reading.then,
+            threshold: json_number(reading.threshold),
+            unit: reading.unit,
+            value: reading.value.map(json_number),
+        }
+    });
+    let boundaries = judgement.boundaries.iter().map(|boundary| {
+        let models = ModelId::ALL.iter().zip(&boundary.models);
+        let [below, above] = boundary.becomes.map(|verdict| verdict.map(Verdict::label));
+        record! {
+            answer_becomes: record! { above: above, below: below },
+            answer_changes_at: ends(&boundary.answer),
+            collision_changes_at: models.map(|(model, at)| (model.name(), ends(at))).collect::<BTreeMap<_, _>>(),
+            parameter: boundary.parameter.key,
+            searched: boundary.range,
+            value: boundary.value,
+        }
+    });
+    let is_answer = matches!(judgement.verdict(), Verdict::Answer(_) | Verdict::Undecided);
+    record! {
+        avoided_by: names(&judgement.avoiders()),
+        boundaries: boundaries.collect::<Vec<_>>(),
+        changes_with: &judgement.flips,
+        clause: &judgement.clause,
+        clauses: clauses.collect::<Vec<_>>(),
+        contact_like: names(&judgement.touching),
+        demand_changes_with: &judgement.demand_flips,
+        demanded: judgement.demand(),
+        drives_through_s: judgement.drives_through_s,
+        dt_s: profile.frame.dt_s,
+        finer_step: CaseSheet::finer_record(judgement),
+        models: models.collect::<Vec<_>>(),
+        nominal_answer: is_answer.then(|| judgement.verdicts.answer().label()),
+        outside_annex_3: &judgement.outside_annex,
+        profile: &judgement.profile,
+        sha256: profile_sha256(profile).unwrap_or_default(),
+        silent: &judgement.silent,
+        time_cap_s: profile.frame.time_cap_s,
+        verdict: judgement.verdict().label(),
+    }
+}
+
 /// The collision verdict of a driver in a word.
 pub(super) fn verdict_of(judgement: &Judgement, judged: &Judged) -> &'static str {
     match (judged.collides(), judged.touches) {
@@ -400,8 +411,8 @@ fn becomes(boundary: &Boundary) -> String {
     if named.is_empty() { "–".to_owned() } else { named.join(", ") }
 }
 
-fn ends(change: &Change) -> Value {
-    json!({"below": change.below, "above": change.above})
+fn ends(change: &Change) -> impl Serialize + use<> {
+    record! { above: change.above, below: change.below }
 }
 
 /// A number with its sign.

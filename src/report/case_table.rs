@@ -1,21 +1,20 @@
 //! A table of concrete cases against the regulation: a row per case with its answer, as text, as JSON and as a table file.
 
+use std::collections::BTreeMap;
 use std::iter::once;
 use std::path::Path;
-
-use serde_json::json;
 
 use super::case_sentences::{drives_through, past_the_cap, touching};
 use super::case_sheet::{CaseSheet, verdict_of};
 use super::lanes::{outcome_cells, outcome_columns};
-use super::records::{self, PROGRAM};
+use super::records::{self, PROGRAM, record};
 use super::tables::wrap;
 use lanesweep_engine::Trace;
 use lanesweep_model::driver::ModelId;
 use lanesweep_run::check::{Answer, CaseVerdicts, Demand, Judged, Judgement, RunEnd, Verdict};
-use lanesweep_support::Result;
 use lanesweep_support::readable::counted;
 use lanesweep_support::table::{Cell, Column, ColumnKind, Table, TableMetadata, TableOf};
+use lanesweep_support::{Result, option};
 
 /// All verdicts, the worst first: those without a driver of Annex 3 that avoids the collision, then those with one, then
 /// those without a collision.
@@ -248,7 +247,7 @@ impl CaseAnswers {
     fn left_out(&self) -> String {
         match self.cases.len().saturating_sub(MAX_ROWS) {
             0 => String::new(),
-            left => format!("The worst {MAX_ROWS} rows; {left} more are in the table of option `rows`."),
+            left => format!("The worst {MAX_ROWS} rows; {left} more are in the table of {}.", option("rows")),
         }
     }
 
@@ -308,20 +307,17 @@ impl CaseAnswers {
     /// # Errors
     /// None for a table of this program.
     pub fn json(&self) -> Result<String> {
-        let counts = |is_traffic| {
-            let counts = WORST_FIRST.map(|of| (of.label().to_owned(), json!(self.count(of, is_traffic))));
-            serde_json::Map::from_iter(counts)
-        };
-        records::document(&json!({
-            "program": PROGRAM,
-            "data": self.origin,
-            "profile": self.profile,
-            "verdict": self.worst().label(),
-            "counts": counts(true),
-            "no_such_traffic": counts(false),
-            "nominal": self.is_nominal,
-            "cases": self.all().records(),
-            "cannot_be_judged": self.broken,
-        }))
+        let counts = |is_traffic| BTreeMap::from(WORST_FIRST.map(|of| (of.label(), self.count(of, is_traffic))));
+        records::document(&record! {
+            cannot_be_judged: &self.broken,
+            cases: self.all().records(),
+            counts: counts(true),
+            data: &self.origin,
+            no_such_traffic: counts(false),
+            nominal: self.is_nominal,
+            profile: &self.profile,
+            program: PROGRAM,
+            verdict: self.worst().label(),
+        })
     }
 }

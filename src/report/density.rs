@@ -1,7 +1,11 @@
 //! Densities as terminal tables.
 
 use std::fmt::Write;
+use std::path::Path;
 
+use serde::Serialize;
+
+use super::records::{record, sorted};
 use lanesweep_stats::density::{DensityModel, Exposure, Rate, Refused, SearchEnd, ValidFraction, standard_deviation};
 use lanesweep_support::readable::{count, count_of, significant};
 use lanesweep_support::table::{Column, Digits, Table};
@@ -52,25 +56,26 @@ pub fn text(model: &DensityModel) -> String {
     text
 }
 
-/// The same as [`text`], as JSON; unknown values are null.
-pub fn record(model: &DensityModel) -> serde_json::Value {
+/// The same as [`text`], with its file, as JSON; unknown values are null.
+pub fn record(model: &DensityModel, file: &Path) -> impl Serialize {
     let id = model.space.id();
     let provenance = &model.provenance;
     let mut parameters = parameters(model);
     parameters.columns[0].name = "name".into();
-    serde_json::json!({
-        "category": id.category.key(),
-        "parameterization": id.key,
-        "description": id.description(),
-        "scenarios": model.kde.points().len(),
-        "found": provenance.found,
-        "kept": provenance.kept,
-        "left_out": provenance.left_out,
-        "parameters": parameters.records(),
-        "bandwidth": model.kde.bandwidth(),
-        "valid": model.valid,
-        "exposure": model.exposure,
-    })
+    record! {
+        bandwidth: sorted(model.kde.bandwidth()),
+        category: id.category.key(),
+        description: id.description(),
+        exposure: sorted(&model.exposure),
+        file: file.display().to_string(),
+        found: provenance.found,
+        kept: provenance.kept,
+        left_out: provenance.left_out,
+        parameterization: id.key,
+        parameters: parameters.records(),
+        scenarios: model.kde.points().len(),
+        valid: sorted(&model.valid),
+    }
 }
 
 /// Location, spread and bounds of every parameter.

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use serde_json::{Map, Value};
+
 use crate::records::{at_contact, smallest_gap_m, time_s};
 use lanesweep_engine::{Chunk, Headway, LanePlan, Outcome};
 use lanesweep_model::criterion::Criterion;
@@ -11,7 +13,7 @@ use lanesweep_run::study::{Study, robust_lanes};
 use lanesweep_stats::density::DensityModel;
 use lanesweep_support::files::make_folder_of;
 use lanesweep_support::table::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter, json_value};
-use lanesweep_support::{Error, Result};
+use lanesweep_support::{Error, Result, option};
 
 /// A table for the lanes of a study; see [`write_study_chunk`]. It is written chunk by chunk, so that memory does not
 /// grow with the lanes.
@@ -41,7 +43,7 @@ pub fn sampled_table(path: &Path, sample: &Sample) -> Result<TableWriter> {
 /// # Errors
 /// [`Error::Usage`] for an unknown ending of the name.
 pub fn table_format(path: &Path) -> Result<TableFormat> {
-    TableFormat::of(path, &TableFormat::EVERY, "option `rows`")
+    TableFormat::of(path, &TableFormat::EVERY, &option("rows"))
 }
 
 fn create(
@@ -136,7 +138,7 @@ pub(super) fn outcome_cells(outcome: &Outcome<f64>, dt_s: f64) -> [Cell<'static>
 }
 
 /// How a lane ended, for a JSON document, in binary64.
-pub fn outcome_json(outcome: &Outcome<f64>, dt_s: f64) -> serde_json::Value {
+pub(crate) fn outcome_record(outcome: &Outcome<f64>, dt_s: f64) -> Map<String, Value> {
     let value = |value: OutcomeValue| json_value(ColumnKind::Binary64, &value(outcome, dt_s));
     OUTCOME.iter().map(|&(name, .., of)| (name.to_owned(), value(of))).collect()
 }

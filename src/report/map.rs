@@ -49,7 +49,7 @@ impl MapReport {
             let not_preventable = self.not_preventable(mapped);
             for (at, model) in mapped.map.models.iter().enumerate() {
                 let svg = self.sheet(mapped, at, &outcomes, not_preventable.clone());
-                let name = format!("{}_{}", mapped.plan.grid.name(), slug(model.name()));
+                let name = format!("{}_{}", mapped.plan.grid.name, slug(model.name()));
                 figures.push(PageFigure::add_svg(&mut results, &name, &svg, "cells.csv")?);
             }
         }
@@ -137,10 +137,10 @@ impl MapReport {
         if self.is_robust() && not_preventable.as_ref().is_some_and(|cells| cells.contains(&true)) {
             notes.push("Red dashes count every cell as computed, an undecided one too.".to_owned());
         }
-        if grid.has_native_gap() {
+        if grid.native_gap {
             notes.push("Initial gap: each model's own distance at the ego's speed, a headway of 2 s where it has none (column initial_gap_m).".to_owned());
         }
-        if grid.style() == CaseStyle::JrcComparison {
+        if grid.style == CaseStyle::JrcComparison {
             notes.push("Cases with the lateral run-up of the JRC's comparison sweep.".to_owned());
         }
         let profile = plan.parts.first().map_or(&self.profile, |part| &part.plan.profile);
@@ -148,11 +148,11 @@ impl MapReport {
         let sheet = MapSheet {
             title: format!(
                 "{}: {}, {}",
-                grid.category().label(),
+                grid.category.label(),
                 mapped.map.models[model].name(),
                 self.criterion.label()
             ),
-            subtitle: format!("Profile {}, map {}. In every cell: {held}.", self.profile.name, grid.name()),
+            subtitle: format!("Profile {}, map {}. In every cell: {held}.", self.profile.name, grid.name),
             grid,
             outcomes,
             cells,

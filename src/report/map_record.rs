@@ -67,15 +67,15 @@ impl MapReport {
             }
         });
         record! {
-            name: grid.name(),
-            category: grid.category().key(),
-            x: axis(grid.x()),
-            y: axis(grid.y()),
-            panel_parameters: grid.panel_axes().iter().map(|a| a.parameter.key).collect::<Vec<_>>(),
+            name: &grid.name,
+            category: grid.category.key(),
+            x: axis(&grid.x),
+            y: axis(&grid.y),
+            panel_parameters: grid.panel_axes.iter().map(|a| a.parameter.key).collect::<Vec<_>>(),
             panels: grid.panels(),
-            fixed: grid.fixed().iter().map(|(p, value)| (p.key, *value)).collect::<Vec<_>>(),
-            cases: grid.style(),
-            native_gap: grid.has_native_gap(),
+            fixed: grid.fixed.iter().map(|(p, value)| (p.key, *value)).collect::<Vec<_>>(),
+            cases: grid.style,
+            native_gap: grid.native_gap,
             cells: map.cell_count(),
             // Cut-outs: cells in which the vehicle that cuts out drives through the one ahead of it.
             drives_through: map.cell_count() - map.possible_cells(),

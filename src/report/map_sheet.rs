@@ -68,7 +68,7 @@ impl MapSheet<'_> {
     /// The plots, and how many are in a row (0: any). The last quantity of the panels has a column per value, the others
     /// a row per combination; one that is not in the grid leaves its place empty.
     fn trellis(&self) -> (usize, Vec<Plot>) {
-        let (panels, last) = (self.grid.panels(), self.grid.panel_axes().len().saturating_sub(1));
+        let (panels, last) = (self.grid.panels(), self.grid.panel_axes.len().saturating_sub(1));
         let mut values: Vec<f64> = panels.iter().filter_map(|panel| panel.get(last).copied()).collect();
         values.sort_by(f64::total_cmp);
         values.dedup();
@@ -95,12 +95,12 @@ impl MapSheet<'_> {
 
     /// `first`: of the panel's values, those from here on are in the heading.
     fn plot(&self, panel: usize, first: usize) -> Plot {
-        let (across, up) = (self.grid.x().edges(), self.grid.y().edges());
+        let (across, up) = (self.grid.x.edges(), self.grid.y.edges());
         let kind = |i: usize, j: usize| self.cells[self.grid.cell(panel, i, j)] as usize;
         let mut cells = Cells { key: self.key(), ..Cells::default() };
         for outcome in self.outcomes {
-            for j in 0..self.grid.y().len() {
-                for (from, to) in runs(self.grid.x().len(), &|i| kind(i, j) == *outcome as usize) {
+            for j in 0..self.grid.y.len() {
+                for (from, to) in runs(self.grid.x.len(), &|i| kind(i, j) == *outcome as usize) {
                     let corners = [(across[from], up[j]), (across[to], up[j + 1])];
                     cells.cells.push(FilledCell { corners, colour: colour(*outcome), tip: "" });
                 }
@@ -128,8 +128,8 @@ impl MapSheet<'_> {
         let axis = |title, edges: &[f64]| PlotAxis::exactly(title, edges[0], edges[edges.len() - 1]);
         Plot {
             heading: self.panel_name(panel, first),
-            x: axis(self.grid.x().parameter.title(), &across),
-            y: axis(self.grid.y().parameter.title(), &up),
+            x: axis(self.grid.x.parameter.title(), &across),
+            y: axis(self.grid.y.parameter.title(), &up),
             cells: Some(cells),
             rules: std::iter::once(rule).chain(not_preventable).collect(),
             height: Height::OfWidth(if self.grid.panels().len() == 1 { 0.6 } else { 0.8 }),
@@ -154,7 +154,7 @@ impl MapSheet<'_> {
 
     /// `ego 90 km/h`.
     fn value_name(&self, axis: usize, value: f64) -> String {
-        let parameter = self.grid.panel_axes()[axis].parameter;
+        let parameter = self.grid.panel_axes[axis].parameter;
         let word = match parameter.key.split_once("_speed") {
             Some((vehicle, _)) => vehicle.to_owned(),
             None => parameter.key.rsplit_once('_').map_or(parameter.key, |(name, _)| name).replace('_', " "),
@@ -165,25 +165,5 @@ impl MapSheet<'_> {
     fn panel_name(&self, panel: usize, first: usize) -> String {
         let values = self.grid.panels()[panel].iter().enumerate().skip(first);
         values.map(|(at, value)| self.value_name(at, *value)).collect::<Vec<_>>().join(", ")
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Lightness of a colour, 0 to 100 (CIE L*).
-    fn lightness(colour: &str) -> f64 {
-        let linear = |at: usize| (f64::from(u8::from_str_radix(&colour[at..at + 2], 16).unwrap()) / 255.0).powf(2.2);
-        let luminance = 0.2126 * linear(1) + 0.7152 * linear(3) + 0.0722 * linear(5);
-        116.0 * luminance.cbrt() - 16.0
-    }
-
-    #[test]
-    fn in_a_grey_print_the_kinds_of_a_sheet_are_told_apart() {
-        let mut kinds = CellOutcome::ALL.map(colour);
-        kinds.sort_by(|a, b| lightness(a).total_cmp(&lightness(b)));
-        let steps = kinds.windows(2).map(|pair| lightness(pair[1]) - lightness(pair[0]));
-        assert!(steps.clone().all(|step| step > 9.0), "{kinds:?} {:?}", steps.collect::<Vec<_>>());
     }
 }

@@ -25,7 +25,7 @@ impl MapReport {
             Some(NumberText(format!("{:+.2}{mark}", percent((mapped, at)) - mapped.known_percent[at]?)))
         };
         let mut shares = Table::of(rows)
-            .column("map", |(mapped, _)| mapped.plan.grid.name())
+            .column("map", |(mapped, _)| mapped.plan.grid.name.as_str())
             .column("model", |(mapped, at)| mapped.map.models[at].name())
             .column("cells", |(mapped, _)| mapped.map.cell_count())
             .columns(
@@ -98,16 +98,16 @@ impl MapReport {
             let brakes = (0..plan.grid.cell_count())
                 .any(|cell| plan.grid.point(cell).get(CaseQuantity::Deceleration).is_some_and(|a| a != 0.0));
             let of_leaders = format!("{CLAUSE_OF_LEADERS}.\n");
-            let is_lvd = plan.grid.category() == Category::Lvd && !self.profile.reg157.clause.is_empty();
+            let is_lvd = plan.grid.category == Category::Lvd && !self.profile.reg157.clause.is_empty();
             if brakes && is_lvd && !all.contains(&of_leaders) {
                 all.push(of_leaders);
             }
-            let is_clause = plan.grid.category() == Category::CutIn && !self.profile.reg157.clause.is_empty();
+            let is_clause = plan.grid.category == Category::CutIn && !self.profile.reg157.clause.is_empty();
             if brakes && is_clause && map.models.contains(&ModelId::Reg157) {
                 all.push(format!(
                     "Reg157 in {}: a vehicle that brakes while it cuts in does not keep its speed, so {} demands nothing of these \
                      cells, whatever the model does.\n",
-                    plan.grid.name(),
+                    plan.grid.name,
                     self.profile.reg157.clause
                 ));
             }
@@ -129,7 +129,7 @@ impl MapReport {
             for cell in 0..map.cell_count() {
                 let drives_through = u8::from(map.drives_through(cell));
                 let values: Vec<String> = plan.grid.values(cell).iter().map(|(_, value)| value.to_string()).collect();
-                let place = format!("{},{}", plan.grid.name(), values.join(","));
+                let place = format!("{},{}", plan.grid.name, values.join(","));
                 for (at, &model) in map.models.iter().enumerate() {
                     let verdicts = map.verdicts(at, cell);
                     let [collision, ttc, btn] = Criterion::ALL.map(|c| u8::from(verdicts.failed(c)));

@@ -1,6 +1,7 @@
 //! Documents in JSON, of `--format json` and of the records in the folders of runs.
 
 use serde::Serialize;
+use serde_json::Value;
 
 use lanesweep_engine::{NO_STEP, Outcome};
 use lanesweep_support::run_folder::{ResultFiles, Results};
@@ -23,6 +24,12 @@ macro_rules! record {
     }};
 }
 pub(super) use record;
+
+/// A value whose keys stand in the order of their letters, as in documents.
+pub(super) fn sorted<T: Serialize + ?Sized>(value: &T) -> Value {
+    // Texts and numbers, which JSON always has.
+    serde_json::to_value(value).unwrap_or_default()
+}
 
 /// When an event happened, s, without the rounding error of the product; `None` if it did not.
 pub(super) fn time_s(step: u32, dt_s: f64) -> Option<f64> {

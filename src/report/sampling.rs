@@ -13,7 +13,7 @@ use lanesweep_model::profile::Profile;
 use lanesweep_model::scenario::Category;
 use lanesweep_run::sampling::{EstimateRow, RiskRate, SampleOptions};
 use lanesweep_stats::density::{DensityModel, Provenance};
-use lanesweep_stats::estimate::{IntervalKind, SearchRound, StopReason, WeightFigures};
+use lanesweep_stats::estimate::{IntervalKind, SearchRound, WeightFigures};
 use lanesweep_support::Result;
 use lanesweep_support::readable::{count, count_of, significant, value};
 use lanesweep_support::run_folder::ResultFiles;
@@ -137,7 +137,7 @@ impl SampleReport {
             draws: &self.draws,
             options: &self.options,
             settings: &self.host.settings,
-            stopped: self.stopped(),
+            stopped: EstimateRow::stopped(&self.estimates),
             reproducible: self.is_reproducible(),
             estimates: &self.estimates,
             search: &self.search,
@@ -145,12 +145,6 @@ impl SampleReport {
             files: files,
             host: &self.host,
         })
-    }
-
-    /// Why the run ended.
-    fn stopped(&self) -> StopReason {
-        let stopped = self.estimates.iter().map(|r| r.estimate.stopped).max_by_key(|s| *s == StopReason::TimeLimit);
-        stopped.unwrap_or(StopReason::Samples)
     }
 
     /// Whether the same flags give the same numbers on every machine.

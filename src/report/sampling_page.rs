@@ -51,7 +51,7 @@ impl SampleReport {
     }
 
     fn estimates_section(&self) -> Section {
-        let estimates = self.table(|r| r.is_overall(&self.estimates) || r.is_rare_beside(&self.estimates));
+        let estimates = self.table(|row| row.is_told(&self.estimates));
         let mut tables = vec![estimates.captioned(format!(
             "Probability of failure, and risk where the exposure is known. Intervals at {} %{}",
             value(100.0 * self.level()),

@@ -116,20 +116,17 @@ impl SampleReport {
     /// What is said about the shown rows, each time with what it is said about. Too few scenarios are said once.
     pub(super) fn remarks(&self) -> Vec<(String, String)> {
         let name = |row: &EstimateRow| format!("{} {} {}", row.model.name(), row.criterion.label(), row.headway);
-        let is_shown = |row: &&EstimateRow| row.is_overall(&self.estimates) || row.is_rare_beside(&self.estimates);
         let (mut remarks, mut few) = (Vec::new(), Vec::new());
-        for row in self.estimates.iter().filter(is_shown) {
+        for row in self.estimates.iter().filter(|row| row.is_told(&self.estimates)) {
             for warning in &row.estimate.trust.warnings {
                 match warning {
                     Warning::FewScenarios { scenarios } => few.push(*scenarios),
                     _ => remarks.push((name(row), warning.to_string())),
                 }
             }
-            let reduction = row.estimate.variance_reduction;
-            if row.estimate.weights.is_some() && reduction < 1.0 {
-                let times = short(1.0 / reduction);
+            if let Some(times) = row.times_crude() {
                 let remark = "times the lanes that crude Monte Carlo (`mc`) needs for the same interval";
-                remarks.push((name(row), format!("this estimator used {times} {remark}")));
+                remarks.push((name(row), format!("this estimator used {} {remark}", short(times))));
             }
         }
         let (low, high) = few.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), few| (low.min(*few), high.max(*few)));
@@ -198,10 +195,7 @@ impl SampleReport {
     /// A density of N scenarios is based on no data below a probability of 1/N; `None` where no row is below.
     fn tail_rule(&self) -> Option<String> {
         let kernels = self.density.kernels;
-        let is_below = self
-            .estimates
-            .iter()
-            .any(|row| row.is_overall(&self.estimates) && row.estimate.probability * (kernels as f64) < 1.0);
+        let is_below = self.estimates.iter().any(|row| row.is_overall(&self.estimates) && row.is_of_tails(kernels));
         is_below.then(|| {
             let (resolved, kernels) = (short(1.0 / kernels as f64), count_of(kernels));
             format!("Probabilities below {resolved} (one in {kernels} scenarios) come from the tails of the density's kernels, not from data")

@@ -20,7 +20,6 @@ use lanesweep_support::Result;
 use lanesweep_support::run_folder::{ResultFiles, Results};
 use lanesweep_support::table::{Column, Digits, Table};
 use serde::Serialize;
-use serde_json::Value;
 
 /// A study's complete report.
 pub struct StudyReport<'a> {
@@ -269,45 +268,55 @@ impl StudyReport<'_> {
 }
 
 /// A best parameterization; undefined numbers are null.
-fn best(best: &Best) -> Value {
+fn best(best: &Best) -> impl Serialize {
     let score = best.score.as_ref();
-    serde_json::json!({
-        "category": best.category.key(), "model": best.model.name(), "criterion": Criterion::Collision.key(),
-        "s_failures": best.failures, "failing_scenarios": best.failing_scenarios,
-        "variant": score.map(|s| &s.variant), "f1": score.map(|s| s.f1),
-        "f1_low": score.map(|s| s.interval.low), "f1_high": score.map(|s| s.interval.high),
-        "hidden": score.map(|s| s.hidden), "not_told_apart": score.map(|s| &s.rivals),
-        "more_data": score.map(|s| s.more_data).filter(|times| times.is_finite()),
-    })
+    record! {
+        category: best.category.key(),
+        criterion: Criterion::Collision.key(),
+        f1: score.map(|s| s.f1),
+        f1_high: score.map(|s| s.interval.high),
+        f1_low: score.map(|s| s.interval.low),
+        failing_scenarios: best.failing_scenarios,
+        hidden: score.map(|s| s.hidden),
+        model: best.model.name(),
+        more_data: score.map(|s| s.more_data).filter(|times| times.is_finite()),
+        not_told_apart: score.map(|s| &s.rivals),
+        s_failures: best.failures,
+        variant: score.map(|s| &s.variant),
+    }
 }
 
 /// The paper's numbers, from highD.
-fn published(scores: &ScoreTable) -> Value {
+fn published(scores: &ScoreTable) -> impl Serialize + use<> {
     let cells = || ModelId::ALL.into_iter().flat_map(|model| Criterion::ALL.into_iter().map(move |c| (model, c)));
     let failures = Category::ALL.into_iter().flat_map(|category| {
         cells().filter_map(move |(model, criterion)| {
             let theirs = published_failures(category, model, criterion)?;
-            Some(serde_json::json!({
-                "category": category.key(), "model": model.name(), "criterion": criterion.key(),
-                "failures": theirs.failures, "simulations": theirs.simulations,
-            }))
+            Some(record! {
+                category: category.key(),
+                criterion: criterion.key(),
+                failures: theirs.failures,
+                model: model.name(),
+                simulations: theirs.simulations,
+            })
         })
     });
-    let lvd = Parameterization::of(Category::Lvd);
-    let f1 = lvd.flat_map(|id| {
+    let f1 = Parameterization::of(Category::Lvd).flat_map(|id| {
         cells().filter_map(move |(model, criterion)| {
-            let theirs = published_lvd_f1(id.key, model, criterion)?;
-            Some(serde_json::json!({
-                "category": id.category.key(), "variant": id.key, "model": model.name(),
-                "criterion": criterion.key(), "f1": theirs,
-            }))
+            let f1 = published_lvd_f1(id.key, model, criterion)?;
+            let (category, criterion, model) = (id.category.key(), criterion.key(), model.name());
+            Some(record! { category: category, criterion: criterion, f1: f1, model: model, variant: id.key })
         })
     });
     let misfit = Misfit::of(scores).map(|misfit| {
-        serde_json::json!({
-            "shares": misfit.rates, "near": misfit.near, "share_rms_points": misfit.rate_rms_points,
-            "f1_values": misfit.f1_values, "f1_mean": misfit.f1_mean, "f1_largest": misfit.f1_largest,
-        })
+        record! {
+            f1_largest: misfit.f1_largest,
+            f1_mean: misfit.f1_mean,
+            f1_values: misfit.f1_values,
+            near: misfit.near,
+            share_rms_points: misfit.rate_rms_points,
+            shares: misfit.rates,
+        }
     });
-    serde_json::json!({"data": "highD", "misfit": misfit, "failures": failures.collect::<Vec<_>>(), "f1": f1.collect::<Vec<_>>()})
+    record! { data: "highD", f1: f1.collect::<Vec<_>>(), failures: failures.collect::<Vec<_>>(), misfit: misfit }
 }

@@ -156,20 +156,3 @@ fn factor(times: f64) -> String {
         t => format!("{:.1}x", (10.0 * t).ceil() / 10.0),
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_factor_is_rounded_up_and_ends_at_a_hundred() {
-        assert_eq!([1.01, 1.3, 9.96, 40.2, 400.0].map(factor), ["1.1x", "1.3x", "10x", "41x", ">100x"]);
-        assert_eq!([f64::INFINITY, f64::NAN].map(factor), [">100x", ">100x"]);
-    }
-
-    #[test]
-    fn names_that_do_not_fit_are_counted() {
-        let names = |n: usize| (1..=n).map(|k| k.to_string()).collect::<Vec<_>>();
-        assert_eq!((list(&names(3)), list(&names(6))), ("1, 2, 3".to_owned(), "6 others".to_owned()));
-    }
-}

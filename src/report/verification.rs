@@ -2,7 +2,10 @@
 
 use std::fmt::Write;
 
-use crate::lanes::outcome_json;
+use serde::Serialize;
+
+use crate::lanes::outcome_record;
+use crate::records::record;
 use lanesweep_engine::verify::{Comparison, DifferingLane, GroupComparison, WORDS};
 use lanesweep_engine::{Outcome, words};
 use lanesweep_model::criterion::Criterion;
@@ -41,7 +44,7 @@ pub fn comparison(comparison: &Comparison) -> String {
 }
 
 /// The same as [`comparison`], as JSON.
-pub fn record(comparison: &Comparison, dt_s: f64) -> serde_json::Value {
+pub fn record(comparison: &Comparison, dt_s: f64) -> impl Serialize + use<> {
     let tallies = Table::of(&comparison.tallies)
         .column("category", |tally| tally.category.key())
         .column("model", |tally| tally.model.name())
@@ -54,17 +57,21 @@ pub fn record(comparison: &Comparison, dt_s: f64) -> serde_json::Value {
         .columns(Criterion::ALL, |of| format!("{}_failures", of.key()), |tally, of| tally.failed[of.index()])
         .build();
     let worst = comparison.worst.iter().map(|lane| {
-        let [cpu, under_test] = [lane.cpu, lane.tested].map(|outcome| outcome_json(&outcome, dt_s));
-        serde_json::json!({"lane": lane.key, "words": lane.names(), "cpu": cpu, "under_test": under_test})
+        record! {
+            cpu: outcome_record(&lane.cpu, dt_s),
+            lane: lane.key.clone(),
+            under_test: outcome_record(&lane.tested, dt_s),
+            words: lane.names(),
+        }
     });
-    serde_json::json!({
-        "set": comparison.set,
-        "plan_sha256": comparison.plan_sha256,
-        "equal": comparison.is_equal(),
-        "modes_differing": comparison.modes_differing,
-        "tallies": tallies.records(),
-        "worst": worst.collect::<Vec<_>>(),
-    })
+    record! {
+        equal: comparison.is_equal(),
+        modes_differing: comparison.modes_differing,
+        plan_sha256: comparison.plan_sha256.clone(),
+        set: comparison.set.clone(),
+        tallies: tallies.records(),
+        worst: worst.collect::<Vec<_>>(),
+    }
 }
 
 /// The words of a lane on the CPU and on the device.

@@ -9,8 +9,8 @@ use lanesweep_engine::{
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::plausibility::{Doubts, Implausible};
 use lanesweep_model::profile::Profile;
-use lanesweep_model::scenario::{CaseParameters, Category, Tables};
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_model::scenario::{CaseParameters, CaseQuantity, Category, Tables};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Name of the only variant.
 const VARIANT: &str = "case";
@@ -140,7 +140,8 @@ fn encode(
     doubts: &mut Doubts,
 ) -> Result<(Category, LaneCase<f64>)> {
     let plain = parameters.checked_case(&profile.frame, doubts)?;
-    let start = match (parameters.gap, parameters.thw) {
+    let (gap_m, thw_s) = (parameters[CaseQuantity::Gap], parameters[CaseQuantity::Thw]);
+    let start = match (gap_m, thw_s) {
         (Some(gap_m), _) => Some(Start::Gap(gap_m)),
         (None, thw_s) => thw_s.map(Start::Headway),
     };
@@ -149,12 +150,12 @@ fn encode(
         (Some(start), true) => case = case.ahead_by(start.gap(plain.ego_speed_mps)),
         (None, false) => {}
         (Some(_), false) => {
-            let key = if parameters.gap.is_some() { "gap" } else { "thw" };
+            let key = if gap_m.is_some() { "gap" } else { "thw" };
             let problem = "the case has its own start, and headways are given for all cases";
-            return Err(Error::usage(Place::item(key), problem, "leave out the column or option `thw`"));
+            return Err(Error::usage(Place::item(key), problem, format!("leave out the column or {}", option("thw"))));
         }
         (None, true) => {
-            let help = "give a column `gap` (m) or `thw` (s), or option `thw` for all cases";
+            let help = format!("give a column `gap` (m) or `thw` (s), or {} for all cases", option("thw"));
             return Err(Error::usage(Place::item("gap"), "the initial distance is missing", help));
         }
     }
@@ -169,66 +170,5 @@ fn of_row(row: u64, error: Error) -> Error {
             Error::input(Place::item(format!("row {row}")).column(key), problem, help)
         }
         other => other,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use lanesweep_engine::{CpuBackend, Trace};
-    use lanesweep_model::criterion::Criterion;
-
-    fn row(category: &str, ego_speed: f64, gap: Option<f64>) -> CaseParameters {
-        CaseParameters {
-            category: Some(category.to_owned()),
-            ego_speed: Some(ego_speed),
-            speed: Some(20.0),
-            gap,
-            lateral_speed: (category == "cut-in").then_some(1.0),
-            acceleration: (category == "lvd").then_some(-6.0),
-            ..CaseParameters::default()
-        }
-    }
-
-    fn plan(rows: Vec<CaseParameters>, headways: &[Headway]) -> Result<Cases> {
-        let profile = Profile::load("paper").unwrap();
-        Cases::plan(rows, 0, &profile, &ModelId::ALL, headways, Implausible::Refused)
-    }
-
-    /// Rows of several categories keep their order, and each is the lane that a single run of it is.
-    #[test]
-    fn every_row_is_the_lane_of_its_numbers() {
-        let profile = Profile::load("paper").unwrap();
-        let rows: Vec<_> = (0..60)
-            .map(|k| row(["cut-in", "lvd"][k % 2], 20.0 + k as f64 / 4.0, Some(5.0 + (k * 7 % 40) as f64)))
-            .collect();
-        let cases = plan(rows.clone(), &[]).unwrap();
-        let outcomes = cases.run(&Executor::new(CpuBackend::lane_arithmetic())).unwrap();
-        let mut collisions = 0;
-        for (at, outcome) in outcomes.iter().enumerate() {
-            let (row, model) = (&rows[at / ModelId::ALL.len()], ModelId::ALL[at % ModelId::ALL.len()]);
-            let frame = &profile.frame;
-            let plain = row.plain_case(frame.default_length_m, frame.default_width_m).unwrap();
-            let mut tables = Tables::default();
-            let case = LaneCase::encode(&plain.case(frame.time_cap_s).unwrap(), &profile, &mut tables).cast::<f32>();
-            let headway = Headway::GapM(row.gap.unwrap());
-            let trace = Trace::record(&profile, plain.category, &case, &tables.cast(), headway, model);
-            assert_eq!(trace.outcome, *outcome, "{row:?} {model:?}");
-            collisions += u32::from(outcome.verdicts.failed(Criterion::Collision));
-        }
-        assert!((10..200).contains(&collisions), "{collisions}");
-    }
-
-    #[test]
-    fn a_wrong_row_is_named_with_its_column() {
-        let said = |rows: Vec<CaseParameters>, headways: &[Headway]| plan(rows, headways).err().unwrap().to_string();
-        let good = row("cut-in", 30.0, Some(10.0));
-        let fast = row("cut-in", 300.0, Some(10.0));
-        assert!(said(vec![good.clone(), fast], &[]).starts_with("column `ego_speed`, row 1"));
-        let nan = row("cut-in", f64::NAN, Some(10.0));
-        assert!(said(vec![nan], &[]).starts_with("column `ego_speed`, row 0"));
-        assert!(said(vec![row("lvd", 30.0, None)], &[]).contains("the initial distance is missing"));
-        assert!(said(vec![good], &[Headway::ThwS(1.0)]).contains("has its own start"));
-        assert!(said(Vec::new(), &[]).contains("there are no rows"));
     }
 }

@@ -8,8 +8,6 @@ pub mod cases;
 pub mod check;
 pub mod grid;
 pub mod parts;
-#[cfg(test)]
-mod pinned_lanes;
 pub mod reopen;
 pub mod sampling;
 pub mod score;
@@ -18,11 +16,11 @@ pub mod study;
 use std::path::Path;
 
 use lanesweep_support::files::check_run_folder;
-use lanesweep_support::run_folder::{ESTIMATE_RECORD, RunFolder, STUDY_RECORD};
+use lanesweep_support::run_folder::RunFolder;
 use lanesweep_support::{Error, Place, Result};
 use parts::{PLAN_FILE, Shard, kind_of};
-use sampling::{Sample, SampleResult};
-use study::{Study, StudyResult};
+use sampling::{ESTIMATE_RECORD, Sample, SampleResult};
+use study::{STUDY_RECORD, Study, StudyResult};
 
 /// A run with the merged result of its parts, bit for bit equal to that of the run in one piece.
 pub enum Merged {
@@ -55,7 +53,7 @@ pub fn merge(dir: &Path, again: &dyn Fn(&str, Shard) -> String) -> Result<(RunFo
             Ok((folder, Merged::Sample(Box::new(merged))))
         }
         other => {
-            let help = "give the folder (option `out`) of a run in parts";
+            let help = format!("give the folder ({}) of a run in parts", lanesweep_support::option("out"));
             Err(Error::input(Place::file(plan), format!("this is a `{other}`, not the plan of a run"), help))
         }
     }

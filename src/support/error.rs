@@ -1,16 +1,43 @@
 //! The error type of the library. Every variant says *where* (file, row, column, scenario or lane), *what* was found or
-//! expected, and *what to do about it*. Texts name an option by its field: option `dt`, or option `backend = cpu`. The
-//! command line shows these as flags.
+//! expected, and *what to do about it*. Texts name an option by [`option`], as the user of this process writes it.
 
 use std::borrow::Cow;
 use std::fmt;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use crate::plain_text::{MAX_PATH, cut, cut_names, shown_in_line};
 
 /// Result of everything in this library that can fail on a user's input.
 pub type Result<T> = std::result::Result<T, Error>;
+
+/// How the users of a process write options.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Notation {
+    /// On a command line: `--dt`, `--backend cpu`.
+    Flag,
+    /// As arguments in Python: `dt`, `backend = cpu`.
+    Argument,
+}
+
+static NOTATION: OnceLock<Notation> = OnceLock::new();
+
+/// Sets the notation of this process; the first one remains.
+pub fn write_options_as(notation: Notation) {
+    NOTATION.get_or_init(|| notation);
+}
+
+/// An option, by the name of its field, in the notation of this process; with a value: `backend = cpu`.
+pub fn option(name: &str) -> String {
+    match NOTATION.get() {
+        None => format!("option `{name}`"),
+        Some(Notation::Flag) => format!("--{}", name.replacen(" = ", " ", 1).replace('_', "-")),
+        // A keyword of Python.
+        Some(Notation::Argument) if name == "from" => "`from_`".to_owned(),
+        Some(Notation::Argument) => format!("`{name}`"),
+    }
+}
 
 /// Adds an error to a list shown to users, unless the list already has it.
 pub fn push_once(list: &mut Vec<Error>, error: Error) {
@@ -45,7 +72,7 @@ impl Place {
         Place::default().of(item)
     }
 
-    /// A field of the library's options. The command line shows it as its flag.
+    /// A field of the library's options, which messages show as [`option`].
     pub fn option(name: &'static str) -> Self {
         Place { option: Some(name), ..Place::default() }
     }
@@ -99,7 +126,7 @@ impl fmt::Display for Place {
             parts.push(shown_in_line(item));
         }
         if let Some(option) = self.option {
-            parts.push(format!("option `{option}`"));
+            parts.push(self::option(option));
         }
         f.write_str(&parts.join(", "))
     }
@@ -220,8 +247,11 @@ impl Error {
                     "files may not become that large here: raise the limit (`ulimit -f`) and run again"
                 }
                 ErrorKind::WouldBlock | ErrorKind::OutOfMemory => {
-                    "the limit of processes or of memory is reached: use fewer threads (option `threads`; more threads than \
-                     cores do not help), or raise the limit (`ulimit -u`, `ulimit -v`)"
+                    return Some(format!(
+                        "the limit of processes or of memory is reached: use fewer threads ({}; more threads than cores do \
+                         not help), or raise the limit (`ulimit -u`, `ulimit -v`)",
+                        option("threads")
+                    ));
                 }
                 ErrorKind::ReadOnlyFilesystem => {
                     "the disk is mounted read-only: choose another path, or mount it writable and run again"
@@ -229,7 +259,9 @@ impl Error {
                 _ => "check that the disk is present and has space, then run again",
             },
             Error::Verification(_) => "",
-            Error::Busy { .. } => "wait for it and run this again, or choose another option `out`",
+            Error::Busy { .. } => {
+                return Some(format!("wait for it and run this again, or choose another {}", option("out")));
+            }
             Error::Internal(_) => "this is a defect of lanesweep: please report it with the command and its input",
             Error::Interrupted { is_kept: true, .. } => "run the same command again: it continues",
             Error::Interrupted { is_kept: false, .. } => "run it again: nothing was kept",

@@ -1,11 +1,11 @@
 //! Atomic writing of report files.
 
 use std::io::{ErrorKind, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::atomic_file::{AtomicFile, folder_of};
 use crate::input_file::claim_output;
-use crate::{Error, Place, Result};
+use crate::{Error, Place, Result, option};
 
 /// Checks that a folder exists or could be created; it only inspects names, before the work starts.
 ///
@@ -44,7 +44,7 @@ pub fn remove_file(path: &Path) -> Result<()> {
 /// [`Error::Input`] for a file.
 pub fn check_run_folder(dir: &Path) -> Result<()> {
     if dir.is_file() {
-        let help = "give the folder (option `out`) that the run was written to";
+        let help = format!("give the folder ({}) that the run was written to", option("out"));
         return Err(Error::input(Place::file(dir), "this is a file; expected the folder of a run", help));
     }
     Ok(())
@@ -104,21 +104,15 @@ pub fn write_inside(path: &Path, produce: impl FnOnce(&mut dyn Write) -> std::io
     file.stage()?.publish()
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_failed_write_leaves_the_old_file_and_nothing_else() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("result.csv");
-        write_atomically(&path, b"old").unwrap();
-        let error = write_inside(&path, |file| {
-            file.write_all(b"half")?;
-            Err(std::io::Error::other("disk gone"))
-        });
-        assert!(error.is_err());
-        assert_eq!(std::fs::read(&path).unwrap(), b"old");
-        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
-    }
+/// The files of a folder, sorted; hidden ones are left out.
+///
+/// # Errors
+/// [`Error::Io`] if the folder cannot be listed.
+pub fn files_of(folder: &Path) -> Result<Vec<PathBuf>> {
+    let listed = std::fs::read_dir(folder).map_err(|e| Error::io(folder, "list", e))?;
+    let is_hidden = |path: &PathBuf| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
+    let mut files: Vec<PathBuf> =
+        listed.flatten().map(|entry| entry.path()).filter(|path| !path.is_dir() && !is_hidden(path)).collect();
+    files.sort();
+    Ok(files)
 }

@@ -16,4 +16,4 @@ pub mod run_folder;
 pub mod table;
 pub mod vector_state;
 
-pub use error::{Error, Place, Result};
+pub use error::{Error, Place, Result, option};

@@ -5,9 +5,8 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
-use crate::atomic_file::folder_of;
-use crate::atomic_file::{Live, is_named, refuse_link};
-use crate::{Error, Place, Result};
+use crate::atomic_file::{Live, folder_of, is_named, refuse_link};
+use crate::{Error, Place, Result, option};
 
 /// Maximum length of a lock file, bytes: a process id and an end of line are shorter.
 const MAX_LOCK_BYTES: u64 = 32;
@@ -107,7 +106,11 @@ fn refuse_foreign(path: &Path, file: &mut File) -> Result<()> {
     file.take(MAX_LOCK_BYTES + 1).read_to_end(&mut text).map_err(|source| Error::io(path, "read", source))?;
     if text.len() as u64 > MAX_LOCK_BYTES || !text.trim_ascii().iter().all(u8::is_ascii_digit) {
         let problem = "it would be overwritten, and it is no lock file of lanesweep";
-        return Err(Error::usage(Place::file(path), problem, "move it away, or give another option `out`"));
+        return Err(Error::usage(
+            Place::file(path),
+            problem,
+            format!("move it away, or give another {}", option("out")),
+        ));
     }
     Ok(())
 }
@@ -127,121 +130,5 @@ fn held(path: &Path, file: &mut File) -> Error {
     Error::Busy {
         place: Box::new(Place::file(path)),
         problem: format!("another lanesweep process is writing this part or run{who}"),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::fs;
-
-    #[test]
-    fn one_holder_at_a_time_and_the_other_is_told_who() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("run.lock");
-        let lock = FolderLock::acquire(&path).unwrap();
-        let error = FolderLock::acquire(&path).unwrap_err();
-        assert!(matches!(error, Error::Busy { .. }), "{error}");
-        assert!(error.to_string().contains("run.lock: another lanesweep process"), "{error}");
-        if cfg!(unix) {
-            assert!(error.to_string().contains(&format!("(pid {})", std::process::id())), "{error}");
-        }
-        assert!(error.help().unwrap().contains("option `out`"));
-        drop(lock);
-        assert!(!path.exists(), "a lock that was given back leaves no file");
-        drop(FolderLock::acquire(&path).unwrap());
-    }
-
-    #[test]
-    fn the_lock_file_of_a_killed_process_is_taken_over() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("run.lock");
-        fs::write(&path, "my notes\n").unwrap();
-        let error = FolderLock::acquire(&path).unwrap_err();
-        assert!(error.to_string().contains("no lock file of lanesweep"), "{error}");
-        assert_eq!(fs::read_to_string(&path).unwrap(), "my notes\n");
-        fs::write(&path, "4000000000\n").unwrap();
-        let lock = FolderLock::acquire(&path).unwrap();
-        if cfg!(unix) {
-            assert_eq!(fs::read_to_string(&path).unwrap().trim(), std::process::id().to_string());
-        }
-        drop(lock);
-        assert!(!path.exists());
-    }
-
-    #[test]
-    fn many_share_a_lock_that_one_cannot_have_alone_meanwhile() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("run.lock");
-        let (first, second) = (FolderLock::share(&path).unwrap(), FolderLock::share(&path).unwrap());
-        assert!(matches!(FolderLock::acquire(&path), Err(Error::Busy { .. })));
-        drop(first);
-        assert!(FolderLock::acquire(&path).is_err(), "one of two still holds it");
-        drop(second);
-        assert!(!path.exists());
-        let alone = FolderLock::acquire(&path).unwrap();
-        assert!(matches!(FolderLock::share(&path), Err(Error::Busy { .. })));
-        drop(alone);
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn a_lock_that_is_a_link_is_refused_and_what_it_leads_to_stays_as_it_is() {
-        let dir = tempfile::tempdir().unwrap();
-        let (precious, path) = (dir.path().join("precious"), dir.path().join("run.lock"));
-        fs::write(&precious, "mine").unwrap();
-        for target in [&precious, &dir.path().join("nowhere")] {
-            std::os::unix::fs::symlink(target, &path).unwrap();
-            let error = FolderLock::acquire(&path).unwrap_err();
-            assert!(error.to_string().contains("this is a link"), "{error}");
-            fs::remove_file(&path).unwrap();
-        }
-        assert_eq!(fs::read_to_string(&precious).unwrap(), "mine");
-        assert!(!dir.path().join("nowhere").exists());
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn a_lock_whose_folder_was_made_anew_does_not_take_the_next_holders_away() {
-        let dir = tempfile::tempdir().unwrap();
-        let out = dir.path().join("out");
-        fs::create_dir(&out).unwrap();
-        let path = out.join("run.lock");
-        let first = FolderLock::acquire(&path).unwrap();
-        fs::remove_dir_all(&out).unwrap();
-        fs::create_dir(&out).unwrap();
-        let second = FolderLock::acquire(&path).unwrap();
-        drop(first);
-        assert!(FolderLock::acquire(&path).is_err(), "the second still holds it");
-        drop(second);
-    }
-
-    #[test]
-    fn a_folder_that_is_not_there_is_an_io_error() {
-        let dir = tempfile::tempdir().unwrap();
-        let error = FolderLock::acquire(&dir.path().join("gone/run.lock")).unwrap_err();
-        assert!(matches!(error, Error::Io { .. }), "{error}");
-    }
-
-    #[test]
-    fn many_that_come_and_go_never_hold_it_together() {
-        use std::sync::atomic::{AtomicUsize, Ordering};
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("run.lock");
-        let (inside, taken) = (AtomicUsize::new(0), AtomicUsize::new(0));
-        std::thread::scope(|scope| {
-            for _ in 0..8 {
-                scope.spawn(|| {
-                    for _ in 0..200 {
-                        let Ok(lock) = FolderLock::acquire(&path) else { continue };
-                        assert_eq!(inside.fetch_add(1, Ordering::SeqCst), 0, "two hold the lock");
-                        taken.fetch_add(1, Ordering::SeqCst);
-                        inside.fetch_sub(1, Ordering::SeqCst);
-                        drop(lock);
-                    }
-                });
-            }
-        });
-        assert!(taken.into_inner() > 0);
     }
 }

@@ -100,7 +100,7 @@ fn check_value(name: &str, value: &Value, schema: &Value) -> Result<()> {
 
 /// The first value that repeats an earlier one, in words. The list has pairs of a value and its text: `0.60` repeats
 /// `0.6`.
-pub fn repeated<K: Eq + Hash, S: Display>(list: impl IntoIterator<Item = (K, S)>) -> Option<String> {
+pub(crate) fn repeated<K: Eq + Hash, S: Display>(list: impl IntoIterator<Item = (K, S)>) -> Option<String> {
     let mut known: HashMap<K, S> = HashMap::new();
     for (meaning, written) in list {
         if let Some(before) = known.get(&meaning) {
@@ -128,7 +128,7 @@ pub fn refuse_repeats<K: Eq + Hash, S: Display>(
 }
 
 /// Help for a repeated value.
-pub const GIVE_ONCE: &str = "give every value once";
+pub(crate) const GIVE_ONCE: &str = "give every value once";
 
 /// Declares tables of settings, with the default of each field: `pub window_s: f64 = 1.0,`.
 #[macro_export]

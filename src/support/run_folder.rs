@@ -14,19 +14,10 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::atomic_file::folder_of;
-use crate::atomic_file::{AtomicFile, Live, StagedFile, clear_stale, refuse_link, sync_folder};
+use crate::atomic_file::{AtomicFile, Live, StagedFile, clear_stale, folder_of, refuse_link, sync_folder};
 use crate::files::{file_name, make_folder, remove_file, write_inside};
-use crate::input_file;
 use crate::lock::FolderLock;
-use crate::{Error, Place, Result};
-
-/// Record of a study.
-pub const STUDY_RECORD: &str = "run.json";
-/// Record of a sampling run.
-pub const ESTIMATE_RECORD: &str = "estimate.json";
-/// Record of a map.
-pub const MAP_RECORD: &str = "map.json";
+use crate::{Error, Place, Result, input_file};
 
 /// Lists the files of the folder's run.
 const LIST: &str = "lanesweep-files.json";
@@ -300,131 +291,4 @@ pub fn unfinished(dir: &Path) -> Option<Vec<String>> {
     let is_cut =
         |list: &FileList| !list.is_complete && list.record.as_ref().is_some_and(|name| !dir.join(name).exists());
     Some(FileList::read(dir).filter(is_cut)?.files.into_iter().map(|(name, _)| name).collect())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::fs;
-
-    fn folder(dir: &Path) -> RunFolder {
-        RunFolder::open(dir, MAP_RECORD).unwrap()
-    }
-
-    fn publish(folder: &RunFolder, names: &[&str], text: &str) -> Result<()> {
-        let mut results = folder.results().unwrap();
-        names.iter().for_each(|name| results.add(name, text.as_bytes()).unwrap());
-        if folder.record.is_some() { results.publish(text.as_bytes()) } else { results.publish_all() }
-    }
-
-    fn names(dir: &Path) -> Vec<String> {
-        let mut names: Vec<String> =
-            fs::read_dir(dir).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
-        names.sort();
-        names
-    }
-
-    #[test]
-    fn a_run_takes_the_place_of_the_one_before_and_nothing_else() {
-        for record in [Some(MAP_RECORD), None] {
-            let dir = tempfile::tempdir().unwrap();
-            let out = &dir.path().join("out");
-            publish(&RunFolder::open(out, record).unwrap(), &["a.csv", "b.svg"], "first").unwrap();
-            fs::write(out.join("notes.txt"), "mine").unwrap();
-            publish(&RunFolder::open(out, record).unwrap(), &["b.svg", "c.csv"], "second").unwrap();
-            let expected = ["b.svg", "c.csv", LIST].into_iter().chain(record).chain(["notes.txt"]);
-            assert_eq!(names(out), expected.collect::<Vec<_>>());
-            assert_eq!(fs::read_to_string(out.join("b.svg")).unwrap(), "second");
-            assert!(is_listed(out, "b.svg") && !is_listed(out, "notes.txt"));
-        }
-    }
-
-    #[test]
-    fn a_folder_is_empty_or_ours_and_what_the_user_wrote_stays() {
-        let list = r#"{"record":"map.json","files":[["a.csv","00"]],"is_complete":true}"#;
-        let outside = list.replace("a.csv", "../a.csv");
-        let record = r#"{"program":"lanesweep 0.2.0","files":["a.csv"]}"#;
-        for (name, text) in [("notes.txt", "mine"), (MAP_RECORD, record), (LIST, list), (LIST, "{}"), (LIST, &outside)]
-        {
-            let dir = tempfile::tempdir().unwrap();
-            let out = dir.path();
-            fs::write(out.join("a.csv"), "mine").unwrap();
-            fs::write(out.join(name), text).unwrap();
-            let error = RunFolder::open(out, MAP_RECORD).unwrap_err();
-            assert!(matches!(error, Error::Usage { .. }) && error.to_string().contains("a.csv"), "{name}: {error}");
-            assert_eq!(fs::read_to_string(out.join("a.csv")).unwrap(), "mine");
-            assert_eq!(fs::read_to_string(out.join(name)).unwrap(), text);
-        }
-        // In a folder of ours: a changed result, and a file in the way of a new one.
-        let dir = tempfile::tempdir().unwrap();
-        let out = dir.path();
-        publish(&folder(out), &["a.csv"], "first").unwrap();
-        fs::write(out.join("b.csv"), "mine").unwrap();
-        assert!(publish(&folder(out), &["b.csv"], "second").unwrap_err().to_string().contains("b.csv"));
-        fs::write(out.join("a.csv"), "mine").unwrap();
-        assert!(RunFolder::open(out, MAP_RECORD).unwrap_err().to_string().contains("a.csv was changed"));
-        assert_eq!(["a.csv", "b.csv"].map(|name| fs::read_to_string(out.join(name)).unwrap()), ["mine", "mine"]);
-    }
-
-    #[test]
-    fn a_run_that_ended_while_its_files_got_their_names_leaves_nothing_beside_the_next() {
-        let dir = tempfile::tempdir().unwrap();
-        let out = dir.path();
-        // A run that ended while it replaced another: no record, files of both.
-        publish(&folder(out), &["a.csv", "b.csv"], "first").unwrap();
-        let mut list = FileList::read(out).unwrap();
-        fs::write(out.join("b.csv"), "second").unwrap();
-        let sha256 = input_file::sha256(&out.join("b.csv")).unwrap();
-        list.files.extend([("b.csv".to_owned(), sha256), ("c.csv".to_owned(), "00".to_owned())]);
-        FileList { is_complete: false, ..list }.write(out).unwrap();
-        // With its record it is complete.
-        assert!(unfinished(out).is_none());
-        fs::remove_file(out.join(MAP_RECORD)).unwrap();
-        assert!(unfinished(out).unwrap().contains(&"c.csv".to_owned()));
-        publish(&folder(out), &["d.csv"], "third").unwrap();
-        assert_eq!(names(out), ["d.csv", LIST, "map.json"]);
-    }
-
-    #[test]
-    fn a_folder_holds_one_verbs_run_and_one_process() {
-        let dir = tempfile::tempdir().unwrap();
-        let out = dir.path().join("out");
-        let held = folder(&out);
-        assert!(matches!(RunFolder::open(&out, STUDY_RECORD), Err(Error::Busy { .. })));
-        assert!(matches!(RunFolder::share(&out), Err(Error::Busy { .. })));
-        publish(&held, &["report.html"], "map").unwrap();
-        drop(held);
-        for other in [Some(STUDY_RECORD), Some("index.csv"), None] {
-            let error = RunFolder::open(&out, other).unwrap_err();
-            assert!(matches!(error, Error::Usage { .. }) && error.to_string().contains("map.json"), "{error}");
-        }
-    }
-
-    #[test]
-    fn a_run_that_fails_leaves_no_folder_and_no_file() {
-        let dir = tempfile::tempdir().unwrap();
-        let out = dir.path().join("out");
-        let failed = folder(&out);
-        let mut results = failed.results().unwrap();
-        results.add("a.csv", b"half").unwrap();
-        drop(results);
-        drop(failed);
-        assert!(!out.exists());
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn links_in_a_folder_from_somebody_else_lead_nowhere() {
-        let dir = tempfile::tempdir().unwrap();
-        let (out, precious) = (dir.path().join("out"), dir.path().join("precious"));
-        fs::create_dir(&out).unwrap();
-        fs::write(&precious, "mine").unwrap();
-        for name in [LOCK, LIST] {
-            std::os::unix::fs::symlink(&precious, out.join(name)).unwrap();
-            let refused = RunFolder::open(&out, MAP_RECORD).unwrap_err();
-            assert!(refused.to_string().contains("this is a link"), "{name}: {refused}");
-            fs::remove_file(out.join(name)).unwrap();
-        }
-        assert_eq!(fs::read_to_string(&precious).unwrap(), "mine");
-    }
 }

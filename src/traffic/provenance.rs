@@ -15,9 +15,8 @@ use super::trajectory::generator::GeneratorOptions;
 use super::trajectory::highd::made_up;
 use lanesweep_model::plausibility::Implausible;
 use lanesweep_model::scenario::{DataProvenance, Driven, ScenarioFile, read_scenario_file, write_scenarios_to};
-use lanesweep_support::Result;
-use lanesweep_support::input_file;
 use lanesweep_support::plain_text::hex;
+use lanesweep_support::{Result, input_file};
 
 /// Source of scenarios.
 #[derive(Debug, Clone, PartialEq)]

@@ -5,6 +5,7 @@
 use std::io::Write;
 use std::path::PathBuf;
 
+pub mod counting;
 pub mod device;
 pub mod exid;
 pub mod lane_sets;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::common;
 use crate::common::device::software_device;
-use crate::common::program::{json, ran, refused, said};
+use crate::common::program::{json, ran, said};
 
 /// `--device` with the index of the software device.
 fn device() -> Option<String> {
@@ -52,17 +52,6 @@ fn a_study_on_a_device_writes_the_same_files_as_on_the_cpu() {
 }
 
 #[test]
-fn verify_passes_on_the_software_device_and_says_what_it_compared() {
-    let Some(device) = device() else { return };
-    let sets = "--random-lanes 400 --config verify.threshold_units=2";
-    let text = ran(Path::new("."), &format!("-q verify --device {device} {sets} {SMALL}"));
-    for part in ["Under test: GPU", "Random lanes", "Lanes on thresholds", "Study", "every word equals the CPU's"] {
-        assert!(text.contains(part), "{part}: {text}");
-    }
-    assert!(text.lines().skip(2).all(|line| line.chars().count() <= 120), "{text}");
-}
-
-#[test]
 fn the_cpu_backend_can_be_verified_without_any_device() {
     let verify = "-q verify --backend cpu --random-lanes 400 --config verify.threshold_units=1";
     assert!(ran(Path::new("."), &format!("{verify} {SMALL}")).contains("Under test: CPU"));
@@ -82,26 +71,4 @@ fn a_gpu_that_is_not_there_has_its_own_exit_code_and_nothing_is_written() {
     let (problem, help) = text.split_once("help:").unwrap();
     assert!(!problem.contains("--backend") && problem.contains("compares a device with the CPU"), "{text}");
     assert!(help.contains("--device") && help.contains("--backend cpu compares"), "{text}");
-}
-
-#[test]
-fn contradicting_flags_are_answered_with_what_to_write() {
-    for (line, hint) in [
-        ("study --backend cpu --device 0", "--device"),
-        ("study --config study.reference=true --backend gpu", "binary64"),
-        ("study --config study.reference=true --device llvmpipe", "binary64"),
-        ("study --backend tpu", "tpu"),
-        ("study --device no-such-device", "no-such-device"),
-        ("verify --backend cpu --random-lanes 0", "--random-lanes"),
-    ] {
-        refused(Path::new("."), line, 2, hint);
-    }
-}
-
-#[test]
-fn recordings_without_a_scenario_are_an_input_that_cannot_be_verified() {
-    let sets = "--random-lanes 40 --config verify.threshold_units=1";
-    let nothing = "--synth-recordings 1 --config generator.duration_s=1";
-    let (code, text) = said(Path::new("."), &format!("-q verify --backend cpu {sets} {nothing}"));
-    assert!(code == 3 && text.contains("no scenario to simulate"), "{code} {text}");
 }

@@ -83,7 +83,7 @@ fn one_dispatch_reaches_beyond_65535_workgroups() {
     assert_every_lane(&plan, 1 << 23);
 }
 
-/// `cargo test --release --test device device_size:: -- --ignored`
+/// `cargo test --release --test commands device_size:: -- --ignored`
 #[test]
 #[ignore = "135 million lanes take about a minute on a software device"]
 fn one_run_reaches_beyond_two_to_the_27_lanes() {

@@ -12,7 +12,7 @@
 //! The guess may lie up to three units in the last place of the true quotient of the mantissas off: Vulkan allows
 //! 2.5. Units below 1 are 2⁻²⁴ and above 2⁻²³; a guess is moved by the unit of the true quotient, also across 1.
 
-use crate::kernel::{Kernel, Path, WORKGROUP};
+use crate::device::kernel::{Kernel, Path, WORKGROUP};
 use bytemuck::{Pod, Zeroable};
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
@@ -208,7 +208,7 @@ fn the_quotient_is_correctly_rounded_as_plain_wgsl() {
     assert_correct(Path::Plain, 1_000_000);
 }
 
-/// The number of the specification: `cargo test --release --test device exact_division:: -- --ignored --nocapture`.
+/// The number of the specification: `cargo test --release --test commands exact_division:: -- --ignored --nocapture`.
 #[test]
 #[ignore = "a longer run of the same"]
 fn twenty_million_quotients_are_correctly_rounded_from_every_guess() {

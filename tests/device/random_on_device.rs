@@ -2,7 +2,7 @@
 //! the software Vulkan, for a million indices in eight dimensions, and for the words at which the table of normal
 //! deviates goes from one cubic to the next.
 
-use crate::kernel::{Kernel, Path, WORKGROUP};
+use crate::device::kernel::{Kernel, Path, WORKGROUP};
 use lanesweep::engine::gpu::shader::RANDOM;
 use lanesweep::stats::random::{Stream, choose, normal_table, standard_normal};
 

@@ -12,8 +12,8 @@ use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOp
 use lanesweep::scenario::{Ahead, Case, Category, Lateral, Participant, Scenario, Speed, Tables};
 use serde_json::json;
 
+use crate::common::counting::Counting;
 use crate::common::lane_sets::{forms, random, run_case, thresholds};
-use crate::counting::Counting;
 
 fn run_in<R: Real>(profile: &Profile, case: &Case, model: ModelId, thw: f64) -> Outcome<f64> {
     run_case(profile, case, model, Start::Headway(R::from_f64(thw)), &mut Silent)

@@ -70,12 +70,6 @@ proptest! {
     }
 
     #[test]
-    fn a_partial_survives_its_file(seed: u64) {
-        let partial = whole(&study(), seed);
-        prop_assert_eq!(read(text_of(&partial).as_bytes()).unwrap(), partial);
-    }
-
-    #[test]
     fn a_changed_digit_is_noticed(seed: u64, at in 0usize..4000) {
         let text = text_of(&whole(&study(), seed));
         let digits: Vec<usize> = text.bytes().enumerate().filter(|(_, b)| b.is_ascii_digit()).map(|(i, _)| i).collect();

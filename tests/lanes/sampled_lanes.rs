@@ -3,9 +3,7 @@
 use crate::common;
 use crate::common::mined::{fitted, provenance, scenarios_of};
 
-use lanesweep::engine::{
-    Backend, CpuBackend, Executor, Headway, Instructions, LaneCase, LanePlan, Outcome, Session, Wanted, words,
-};
+use lanesweep::engine::{Backend, CpuBackend, Headway, Instructions, LaneCase, LanePlan, Wanted, words};
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::{MODELS, ModelId};
 use lanesweep::model::profile::Profile;
@@ -220,25 +218,6 @@ fn indices_beyond_32_bits_are_samples_of_their_own() {
     }
     let key = plan.key(plan.lane_count() - 1).unwrap();
     assert_eq!(plan.parse_key(&plan.key_text(&key)), Some(key));
-}
-
-#[test]
-fn verdicts_of_samples_come_without_their_values_too() {
-    let density = density(Category::Lvd, "iv", false);
-    let profile = Profile::load("paper").unwrap();
-    let plan = plan_samples(&density, &profile, &options(2000)).unwrap();
-    let cpu = CpuBackend::lane_arithmetic();
-    let mut verdicts = Vec::new();
-    Executor::new(&cpu)
-        .sweep(&plan, 0..2000, Wanted::Verdicts, |chunk| {
-            verdicts.extend(chunk.verdicts);
-            Ok(())
-        })
-        .unwrap();
-    let mut session: Box<dyn Session> = cpu.prepare(&plan).unwrap();
-    let valued: Vec<Outcome<f64>> = session.run(0..2000, Wanted::Outcomes).unwrap().outcomes;
-    assert!(verdicts.iter().zip(&valued).all(|(v, o)| *v == o.verdicts));
-    assert!(verdicts.iter().any(|v| v.0 != 0));
 }
 
 /// Failures of samples, and of the scenarios that they come from, at finer and coarser steps: none vanish.

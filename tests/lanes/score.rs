@@ -8,7 +8,7 @@ use lanesweep::engine::{Confusion, LaneKey, LanePlan, Partial, Verdicts};
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::run::score::{
-    ScoreOptions, ScoreTable, best_parameterizations, check_claims, f1, precision, recall, score,
+    ClaimVerdict, ScoreOptions, ScoreTable, best_parameterizations, check_claims, f1, precision, recall, score,
 };
 use lanesweep::scenario::Category;
 
@@ -34,6 +34,47 @@ fn noisy<'p>(plan: &'p LanePlan, wrong: &'p [u64]) -> impl Fn(u64) -> Verdicts +
 }
 
 #[test]
+fn a_confusion_by_hand() {
+    let scores = |tp, fn_, fp, tn| {
+        let counts = Confusion { tp, fn_, fp, tn };
+        (recall(&counts), precision(&counts), f1(&counts))
+    };
+    let by_hand = (Some(0.75), Some(0.6), Some(12.0 / 18.0));
+    assert_eq!(scores(6_u64, 2, 4, 88), by_hand);
+    assert_eq!(scores(6 << 40, 2 << 40, 4 << 40, 88 << 40), by_hand, "past 2^32 too");
+    assert_eq!(scores(0, 0, 0, 100), (None, None, None));
+    assert_eq!(scores(0, 3, 0, 7), (Some(0.0), None, Some(0.0)));
+}
+
+/// Verdicts on the paper's claims about cut-outs: so many scenarios fail per model; S' repeats S but for `c`, which never
+/// fails, and `d`, which `d` says.
+#[test]
+fn claims_are_judged_by_scenarios_and_need_enough_of_them() {
+    let plan = plan(&[(Category::CutOut, 400, &["a", "b", "c", "d", "e", "f", "g"])]);
+    let verdict = |id: &str, failing: [u64; 4], is_d_bad: bool| {
+        let lane = |lane: u64| {
+            let key = plan.key(lane).unwrap();
+            let fails = key.unit < failing[key.model] && key.variant != 3 && !(is_d_bad && key.variant == 4);
+            Verdicts(if fails { 0b111 } else { 0 })
+        };
+        let counts = part(&plan, 0..400, &lane);
+        let table = score(&plan, &counts, &ScoreOptions::default()).unwrap();
+        check_claims(&table, &plan, &counts).into_iter().find(|of| of.claim.id == id).unwrap().verdict
+    };
+    for (id, failing, is_d_bad, expected) in [
+        ("cut-out b = d", [200; 4], false, ClaimVerdict::Holds),
+        ("cut-out b = d", [200; 4], true, ClaimVerdict::Contradicted),
+        ("cut-out b = d", [9; 4], true, ClaimVerdict::TooFew),
+        ("cut-out c FN", [200; 4], false, ClaimVerdict::Holds),
+        ("cut-out c ~ 0", [200; 4], false, ClaimVerdict::Holds),
+        ("cut-out failures", [200, 0, 30, 30], false, ClaimVerdict::Contradicted),
+        ("cut-out failures", [220, 200, 4, 4], false, ClaimVerdict::Holds),
+    ] {
+        assert_eq!(verdict(id, failing, is_d_bad), expected, "{id}, {failing:?}");
+    }
+}
+
+#[test]
 fn a_study_that_never_fails_has_no_score() {
     let plan = plan(&[(Category::Lvd, 3, LVD)]);
     let table = table(&plan, &|_| Verdicts(0));
@@ -43,21 +84,6 @@ fn a_study_that_never_fails_has_no_score() {
         assert_eq!(values, (None, None, None));
         assert_eq!((cell.f1_interval, cell.failing_scenarios, cell.counts.tn), (None, 0, 30));
     }
-}
-
-#[test]
-fn f1_of_few_failing_scenarios_has_no_interval() {
-    let cell = |units: usize, failing: u64| {
-        let plan = plan(&[(Category::Lvd, units, LVD)]);
-        let table = table(&plan, &|lane| Verdicts(u8::from(plan.key(lane).unwrap().unit < failing)));
-        let scores = &table.categories[0];
-        scores.cells[scores.index(1, ModelId::Fsm, Criterion::Collision).unwrap()].clone()
-    };
-    // Nine scenarios that fail from ten headways: no interval. Ten never make [1, 1].
-    let (nine, ten) = (cell(20, 9), cell(20, 10));
-    assert_eq!((f1(&nine.counts), nine.counts.tp, nine.failing_scenarios, nine.f1_interval), (Some(1.0), 90, 9, None));
-    let interval = ten.f1_interval.unwrap();
-    assert!(ten.failing_scenarios == 10 && interval.high == 1.0 && interval.low < 0.9, "{interval:?}");
 }
 
 #[test]

@@ -114,7 +114,7 @@ fn in_calls(plan: &LanePlan, backend: &CpuBackend<f32>, units: u64) -> (Vec<Outc
     (outcomes, verdicts)
 }
 
-/// Minutes: `cargo test --release --test lanes simd_equals_scalar:: -- --ignored`.
+/// Minutes: `cargo test --release --test library simd_equals_scalar:: -- --ignored`.
 #[test]
 #[ignore = "minutes: 10^6 lanes per model and category"]
 fn a_million_random_lanes_per_model_and_category_are_equal() {

@@ -12,7 +12,6 @@
 
 use crate::memory;
 mod mutate;
-use crate::common::plans;
 mod readers;
 mod seeds;
 use crate::common::small;

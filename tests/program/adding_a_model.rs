@@ -1,8 +1,8 @@
 //! Adding a driver model touches one Rust file, one WGSL file and one line of the registry: the example of
 //! `examples/adding-a-driver-model` is built in a copy of the sources and runs on the CPU and on a device.
 //!
-//! Ignored, because it compiles our crates a second time (minutes):
-//! `cargo test --release --test program adding_a_model:: -- --ignored`
+//! Of `.ci/long`, because it compiles our crates a second time (minutes):
+//! `cargo test --release --test commands adding_a_model:: -- --ignored`
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -41,17 +41,13 @@ fn sources(root: &Path) -> Tree {
     tree
 }
 
-/// Makes the folder hold exactly these files. What is right already is not touched, so that cargo sees from the
-/// times of the files that nothing is to be built again.
+/// Writes what differs, so that cargo sees from the times of the files that nothing else is to be built again.
 fn write(tree: &Tree, root: &Path) {
     let present = sources(root);
-    for stale in present.keys().filter(|at| !tree.contains_key(*at)) {
-        fs::remove_file(root.join(stale)).unwrap();
-    }
+    present.keys().filter(|at| !tree.contains_key(*at)).for_each(|stale| fs::remove_file(root.join(stale)).unwrap());
     for (at, content) in tree.iter().filter(|(at, content)| present.get(*at) != Some(content)) {
-        let path = root.join(at);
-        fs::create_dir_all(path.parent().unwrap()).unwrap();
-        fs::write(path, content).unwrap();
+        fs::create_dir_all(root.join(at).parent().unwrap()).unwrap();
+        fs::write(root.join(at), content).unwrap();
     }
 }
 
@@ -102,7 +98,7 @@ fn target_dir() -> PathBuf {
 }
 
 /// Runs the program that knows the new model.
-fn lanesweep(line: &str) -> Output {
+fn with_the_model(line: &str) -> Output {
     let program = target_dir().join("release").join(format!("lanesweep{}", std::env::consts::EXE_SUFFIX));
     Command::new(program).env("NO_COLOR", "1").args(words(line)).output().unwrap()
 }
@@ -139,14 +135,14 @@ fn reaction(output: &Output) -> f64 {
 }
 
 fn runs_one_case() {
-    let output = lanesweep(CASE);
+    let output = with_the_model(CASE);
     // By hand: the leader brakes at 6 m/s² from 12 m/s, 18 m ahead; dv = 6t and g = 18 − 3t², and g ≤ 1.5 dv from
     // t = (√(81 + 216) − 9)/6 = 1.37 s on; the next step of 0.04 s is 1.40 s.
     let reacted = reaction(&output);
     assert!((reacted - 1.40).abs() < 0.041, "{}", said(&output));
-    let wrong = lanesweep(&CASE.replace("AEB", "AEBS"));
+    let wrong = with_the_model(&CASE.replace("AEB", "AEBS"));
     assert!(!wrong.status.success() && said(&wrong).contains("FSM, AEB"), "{}", said(&wrong));
-    let help = said(&lanesweep("simulate --help"));
+    let help = said(&with_the_model("simulate --help"));
     assert!(help.contains("FSM, AEB"), "{help}");
 }
 
@@ -156,20 +152,18 @@ fn takes_its_constants_from_a_profile(ours: &Tree) {
     let with = |table: &str| {
         let path = dir.path().join("own.toml");
         fs::write(&path, format!("{paper}\n[aeb]\n{table}\n")).unwrap();
-        lanesweep(&format!("{CASE} --profile {}", path.display()))
+        with_the_model(&format!("{CASE} --profile {}", path.display()))
     };
     assert!(reaction(&with("trigger_ttc_s = 3.0")) < 1.2, "an earlier trigger reacts earlier");
     let bad = with("trigger_ttc_s = -1.0");
     assert!(bad.status.code() == Some(2) && said(&bad).contains("aeb.trigger_ttc_s"), "{}", said(&bad));
-    let unknown = with("trigger = 3.0");
-    assert!(unknown.status.code() == Some(2) && said(&unknown).contains("unknown field"), "{}", said(&unknown));
 }
 
 fn stands_in_every_table_of_a_study() {
     let dir = tempfile::tempdir().unwrap();
     let (out, lanes) = (dir.path().join("result"), dir.path().join("lanes.csv"));
     let files = format!("--out {} --rows {}", out.display(), lanes.display());
-    let output = lanesweep(&format!("-q study --synth-recordings 1 {files}"));
+    let output = with_the_model(&format!("-q study --synth-recordings 1 {files}"));
     assert!(output.status.success(), "{}", said(&output));
     let read = |path: &Path| fs::read_to_string(path).unwrap();
     for name in ["failures.csv", "f1.csv"] {
@@ -178,11 +172,9 @@ fn stands_in_every_table_of_a_study() {
     assert!(!read(&out.join("claims.csv")).contains("AEB"), "the paper's claims are about its own models");
     assert!(read(&out.join("radar-lvd.svg")).contains("AEB"), "a spoke per model and criterion");
     assert!(read(&out.join("run.json")).contains("trigger_ttc_s"), "the defaults are on record");
-    // One lane in five is the new model's.
     let rows = read(&lanes);
     let of = |model: &str| rows.lines().filter(|l| l.contains(&format!(",{model},"))).count();
     assert!(of("AEB") > 0 && of("AEB") == of("FSM"), "{} {}", of("AEB"), of("FSM"));
-    println!("{} lanes of AEB in the study", of("AEB"));
 }
 
 fn gives_the_same_words_on_a_device() {
@@ -191,11 +183,10 @@ fn gives_the_same_words_on_a_device() {
     }
     let verify =
         "-q verify --device llvmpipe --random-lanes 2000 --config verify.threshold_units=2 --synth-recordings 1";
-    let output = lanesweep(verify);
+    let output = with_the_model(verify);
     let text = said(&output);
     assert!(output.status.success(), "{text}");
     assert!(text.contains("every word equals the CPU's"), "{text}");
     let rows = text.lines().filter(|line| line.contains("| AEB ")).count();
     assert_eq!(rows, 9, "three sets of three categories hold it: {text}");
-    println!("{text}");
 }

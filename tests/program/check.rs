@@ -186,16 +186,6 @@ fn at_the_boundary_of_a_driver_or_of_the_answer_it_is_not_called_robust() {
     assert!(code == 0 && answer.contains("the answer is robust; the verdict of CCHDM changes with "), "{answer}");
 }
 
-/// By hand: 60 behind 100 km/h that brakes at 6.8 m/s², 3 m ahead; the TTC is 2 s at 2.382 s (`lanes/domain_claims.rs`), and
-/// CCHDM brakes 0.75 s later.
-#[test]
-fn braking_on_a_gap_that_opened_begins_a_delay_after_the_reaction() {
-    let sheet = json("cut-in 60 100 3 1.5 --acceleration=-6.8");
-    let models = sheet["profiles"][0]["models"].as_array().unwrap();
-    let cchdm = models.iter().find(|model| model["model"] == "CCHDM").unwrap();
-    assert!((cchdm["braking_s"].as_f64().unwrap() - 3.132).abs() < 0.011, "{cchdm}");
-}
-
 /// FSM finds both vehicles unsafe from the start and brakes for the nearer one, which leaves; with the larger demand it stops.
 /// A driver that tests the TTC once sees no danger at 40 m: it is above 2 s then. 30 km/h faster, the system has to avoid the
 /// collision from 1.044 s of TTC on at the intrusion: 1.084 s 18.2 m ahead, 0.1 s less where the front tyre counts.
@@ -228,45 +218,6 @@ fn what_another_reading_turns_is_named_and_not_called_robust() {
     let cut_out = "cut-out --ego-speed 130km/h --thw 2 --lateral-speed 1.1 --ahead-gap 60";
     assert_eq!(of(cut_out, "frame.cut_out_target = largest-demand", "FSM alone"), "not preventable");
     assert_eq!(of("cut-in 60 20 40 1", "CCHDM tests TTC once", "all"), "not preventable");
-}
-
-/// What stands on the sheet is the case: every digit, no deceleration that is none, 5.2.5.1 for leaders that brake.
-#[test]
-fn the_numbers_and_sentences_of_a_sheet_are_those_of_its_case() {
-    let hidden = "cut-in 78.112 70 0.5 0.761 --lane-width 4 --length 2.2 --width 0.8 --ego-length 4.9 --ego-width 1.9";
-    agree(
-        "
-        cut-in 130 0 143.949 1 = 8
-        + gap 143.949 m
-        + Initial gap: 143.949 m
-        + 130 km/h (36.11 m/s)
-        cut-in 60 55 10 1 --acceleration 1 --end-speed 60km/h = 9
-        + other vehicle's acceleration 1 m/s²
-        + Acceleration of the other vehicle: 1 m/s²
-        - eceleration -1
-        - eceleration of the other vehicle
-        lvd --ego-speed 60km/h --gap 40 --acceleration=0 = 9
-        - 5.2.5.1
-        ",
-    );
-    agree(&format!("{hidden} = 9\n+ (c) TTC at lane intrusion does not exist, because the other vehicle is behind"));
-    // A step of an even scan is 3 m: FSM collides from 0.52 to 2.54 m.
-    let gap = json(hidden)["profiles"][0]["boundaries"][0].clone();
-    assert_eq!(gap["collision_changes_at"]["FSM"]["above"], 0.52);
-    // A vehicle beside the ego moves into it; its centre is ahead.
-    let (_, out, _) = run("cut-in 60 59 0 1");
-    let row = out.lines().find(|line| line.contains("| FSM    | COLLIDES")).unwrap();
-    assert_eq!(row.split('|').nth(7).unwrap().trim(), "side", "{row}");
-}
-
-/// The columns of a contact: its kind, and the ego's speed minus the other's, with its sign.
-#[test]
-fn a_contact_has_its_kind_and_the_sign_of_its_closing_speed() {
-    let (_, out, error) = run("cut-in 60 45 24 1 --acceleration -5");
-    let row = out.lines().find(|line| line.contains("| CCHDM  | COLLIDES")).unwrap_or_else(|| panic!("{out} {error}"));
-    let cells: Vec<&str> = row.split('|').map(str::trim).collect();
-    assert_eq!(cells[7], "rear-end");
-    assert!(cells[8].parse::<f64>().unwrap() > 0.0, "{row}");
 }
 
 #[test]
@@ -324,25 +275,6 @@ fn the_sheet_and_the_series_have_one_time_of_braking() {
         assert!(times >= 2, "{name}: {shown} s is there {times} times");
     }
     refused(dir.path(), &arguments("cut-in 60 40 15 1 --sheet case.pdf"), 2, ".html");
-}
-
-#[test]
-fn what_holds_no_case_is_refused_with_what_to_give() {
-    let dir = tempfile::tempdir().unwrap();
-    for (name, content) in [("a.xosc", "<OpenSCENARIO/>"), ("c.csv", "category\n"), ("d.txt", "cut-in")] {
-        std::fs::write(dir.path().join(name), content).unwrap();
-    }
-    for (line, code, says) in [
-        ("check", 2, "there is nothing to check"),
-        ("check a.xosc", 2, "give a .jsonl scenario file"),
-        ("check a.xosc --scenario a", 2, "give a .jsonl scenario file"),
-        ("mine a.xosc", 3, "OpenSCENARIO is written by `simulate`, not read"),
-        ("check c.csv", 3, "it has no rows"),
-        ("check d.txt", 2, "holds no case"),
-        ("check --category cut-in --ego-speed fast", 2, "60km/h"),
-    ] {
-        refused(dir.path(), line, code, says);
-    }
 }
 
 #[test]
@@ -429,18 +361,6 @@ fn a_description_that_contradicts_itself_is_refused_alike_by_every_verb_and_from
     refused(dir, "check case.csv --row 1 --end-speed 40m/s", 2, "end_speed: 40 m/s cannot be reached");
 }
 
-/// The near edge of a cutter is 0.3 m beyond the marking earlier if it is wide, and later in a narrow lane; the ego's width
-/// has no part in it.
-#[test]
-fn lane_intrusion_follows_from_the_width_of_lane_and_cutter() {
-    for (more, visible_s) in [("--width 2.5", 0.8), ("--ego-width 2.5", 1.1), ("--lane-width 3.0", 0.85)] {
-        let sheet = json(&format!("cut-in 60 40 15 1 {more}"));
-        let clauses = sheet["profiles"][0]["clauses"].as_array().unwrap();
-        let visible = clauses.iter().find(|clause| clause["condition"].as_str().unwrap().starts_with("(b)")).unwrap();
-        assert!((visible["value"].as_f64().unwrap() - visible_s).abs() < 1e-6, "{more}: {visible}");
-    }
-}
-
 /// Annex 3 says what its driver does with a leader that decelerates beyond 5 m/s²: no reading of softer ones applies.
 #[test]
 fn readings_of_soft_leaders_are_not_named_for_hard_ones() {
@@ -450,25 +370,6 @@ fn readings_of_soft_leaders_are_not_named_for_hard_ones() {
         let soft = readings.filter(|reading| reading.starts_with("cchdm.lvd_below_threshold")).count();
         assert_eq!(soft > 0, is_soft, "{deceleration}: {sheet}");
     }
-}
-
-#[test]
-fn a_document_gives_an_answer_only_where_the_profile_has_one() {
-    let first = |case: &str| json(case)["profiles"][0].clone();
-    let eu = first("cut-in 60 40 15 1 --profiles eu-2022-1426");
-    assert_eq!((&eu["verdict"], &eu["nominal_answer"]), (&"not judged".into(), &Value::Null));
-    let near = first("cut-in 60 40 8 1");
-    assert_eq!((&near["verdict"], &near["nominal_answer"]), (&"undecided".into(), &"preventable".into()));
-    // At equal speeds nothing is avoided; with 0.1 km/h more the gap closes beyond the end of a run.
-    let sheet = json("cut-in 60 60 15 1");
-    let profile = &sheet["profiles"][0];
-    assert_eq!((&profile["verdict"], &profile["avoided_by"]), (&"no conflict".into(), &Value::Array(Vec::new())));
-    let answer = sheet["answer"].as_str().unwrap();
-    assert!(answer.contains("(robust within the 120 s of a run: with ego + 0.1 km/h"), "{answer}");
-    // A TTC that does not exist stays infinite.
-    let readings = profile["clauses"].as_array().unwrap();
-    let ttc = readings.iter().find(|reading| reading["condition"] == "(c) TTC at lane intrusion").unwrap();
-    assert_eq!(ttc["value"], "Infinity");
 }
 
 #[test]

@@ -22,40 +22,6 @@ fn file(dir: &Path, name: &str, content: &str) {
     std::fs::write(dir.join(name), content).unwrap();
 }
 
-const BOTH: &str = "60 has no unit: as m/s it is 216 km/h, as km/h 16.67 m/s";
-
-#[test]
-fn a_bare_speed_is_refused_in_every_way_to_give_a_case_and_0_is_not() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    file(dir, "bare.toml", "category = \"cut-in\"\nego_speed = 60\nspeed_kmh = 40\ngap = 15\nlateral_speed = 1\n");
-    file(dir, "bare.csv", "category,ego_speed,speed_kmh,gap,lateral_speed\ncut-in,60,40,15,1\n");
-    file(
-        dir,
-        "instants.csv",
-        "id,category,time_s,ego_speed,ego_length,ego_width,side,target_length,target_width,target_v,target_y\n\
-         a,cut-in,0,60,4,2,left,4,2,20,3.5\na,cut-in,1,60,4,2,left,4,2,20,2.5\n",
-    );
-    for (line, status, place) in [
-        ("check --category cut-in --ego-speed 60", 2, "--ego-speed"),
-        ("check bare.toml", 2, "bare.toml, line 2, `ego_speed`"),
-        ("simulate --case-file bare.toml", 2, "bare.toml, line 2, `ego_speed`"),
-        ("check bare.csv", 3, "bare.csv, line 2, column `ego_speed`"),
-        ("check bare.csv --row 1", 3, "bare.csv, line 2, column `ego_speed`"),
-        ("simulate --table bare.csv", 3, "bare.csv, line 2, column `ego_speed`"),
-        ("study --scenarios bare.csv", 3, "bare.csv, line 2, column `ego_speed`"),
-        ("study --scenarios instants.csv", 3, "instants.csv, line 2, column `ego_speed`, scenario a"),
-    ] {
-        let (code, error) = said(dir, line);
-        assert!(code == status && error.contains(BOTH) && error.contains(place), "{line}: {code} {error}");
-        assert!(error.contains("60km/h or 60m/s"), "{line}: {error}");
-        assert_eq!(error.contains("`ego_speed_kmh`"), status == 3 || place.contains("toml"), "{line}: {error}");
-    }
-    file(dir, "still.csv", "category,ego_speed_kmh,speed,gap,acceleration\nlvd,60,0,60,-1\n");
-    // A standing vehicle needs no unit.
-    ran(dir, "simulate --table still.csv --models FSM");
-}
-
 /// 60 km/h, 40 km/h, 15 m and 1 m/s in all spellings are one case.
 #[test]
 fn the_unit_may_stand_in_the_name_or_in_the_value() {
@@ -82,38 +48,6 @@ fn the_unit_may_stand_in_the_name_or_in_the_value() {
         file(dir, "case.csv", &table);
         let by_row = document(dir, "check case.csv --row 1 --profiles paper");
         assert_eq!(by_row["profiles"], by_flags["profiles"], "{table}");
-    }
-}
-
-#[test]
-fn two_units_of_one_quantity_and_units_of_another_are_refused_with_their_place() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    for (keys, line, problem) in [
-        ("speed_kmh = 40\nspeed_mps = 11", "line 3", "`speed_mps` says the same as `speed_kmh`"),
-        ("ego_speed_mps = \"60km/h\"", "line 2", "its name says another unit"),
-        ("ego_speed_mph = 37", "line 2", "its name says miles per hour"),
-        ("ego_speed = \"60m\"", "line 2", "write a speed such as 60km/h"),
-        ("ego_speed = true", "line 2", "expected a number, or a text with its unit"),
-        ("gap = \"15km\"", "line 2", "write a length in metres"),
-        ("thw = \"1200ms\"", "line 2", "write a time in seconds"),
-        ("acceleration = \"-0.6g\"", "line 2", "-5.884m/s2 if -0.6 g is meant"),
-        ("lateral_sped = 1", "line 2", "did you mean `lateral_speed`?"),
-    ] {
-        file(dir, "case.toml", &format!("category = \"cut-in\"\n{keys}\n"));
-        let (code, error) = said(dir, "check case.toml");
-        let place = format!("case.toml, {line}");
-        assert!(code == 2 && error.contains(&place) && error.contains(problem), "{keys}: {error}");
-    }
-    for (header, row, place, problem) in [
-        ("speed_kmh,speed_mps", "40,11", "column `speed_mps`", "holds the same as the column `speed_kmh`"),
-        ("ego_speed_mps", "60km/h", "column `ego_speed_mps`", "its name says another unit"),
-        ("gap", "15km", "column `gap`", "write a length in metres"),
-        ("acceleration", "-0.6g", "column `acceleration`", "-5.884m/s2 if -0.6 g is meant"),
-    ] {
-        file(dir, "case.csv", &format!("category,{header}\ncut-in,{row}\n"));
-        let (code, error) = said(dir, "check case.csv");
-        assert!(code == 3 && error.contains(place) && error.contains(problem), "{header}: {error}");
     }
 }
 
@@ -239,62 +173,4 @@ fn a_nominal_batch_answers_by_lanes_and_says_that_nothing_else_was_examined() {
         assert_eq!(case["verdict"], row.1, "{case}");
     }
     assert_eq!(document(dir, &format!("{nominal} --threads 1")), found, "threads change nothing");
-}
-
-#[test]
-fn a_row_that_cannot_be_judged_is_named_and_the_others_are_judged() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    let mild = ROWS[1].0;
-    for (row, place) in [
-        ("b,cut-in,fast,72,36,1", "cases.csv, line 3, column `ego_speed_kmh`"),
-        ("b,cut-in,108,72,36,", "cases.csv, line 3, column `lateral_speed`"),
-        ("b,cut-in,108,72,,1", "cases.csv, line 3, column `gap, thw`"),
-        ("b,cut-in,108,72,36,1,9", "cases.csv, line 3"),
-        ("b,cutin,108,72,36,1", "cases.csv, line 3, column `category`"),
-        ("b,cut-in,1080,72,36,1", "cases.csv, line 3, column `ego_speed_kmh`"),
-    ] {
-        file(dir, "cases.csv", &format!("{HEADER}{mild}\n{row}\nlast,cut-in,60,70,12,1\n"));
-        let (code, out, error) = run(dir, "check cases.csv");
-        assert!(code == 4 && error.contains(place), "{row}: {code} {error}");
-        assert!(out.contains("2 cases under un-r157: 1 preventable, 1 no conflict; 1 row cannot be judged"), "{out}");
-        let found = document(dir, "check cases.csv");
-        assert!(found["cannot_be_judged"][0].as_str().unwrap().contains(place), "{found}");
-        let rows: Vec<&Value> = found["cases"].as_array().unwrap().iter().map(|case| &case["row"]).collect();
-        assert_eq!(rows, [1, 3]);
-    }
-    file(dir, "cases.csv", HEADER);
-    assert_eq!(run(dir, "check cases.csv").0, 3, "a table without rows has no answer");
-}
-
-#[test]
-fn of_two_rows_with_one_id_neither_is_used_in_any_path() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    let again = "away,cut-in,108,72,40,1";
-    file(dir, "cases.csv", &format!("{HEADER}{}\n{}\n{again}\n", ROWS[2].0, ROWS[1].0));
-    let said = "cases.csv, line 4, column `id`: this id belongs to line 2 too";
-    let (code, out, error) = run(dir, "check cases.csv");
-    assert!(code == 4 && error.contains(said), "{error}");
-    assert!(out.contains("1 case under un-r157: 1 preventable; 2 rows cannot be judged"), "{out}");
-    assert!(!out.contains("away") && error.contains("line 2, column `id`: this id belongs to line 4 too"), "{error}");
-    for line in ["check cases.csv --row 3", "simulate --table cases.csv --row 3"] {
-        refused(dir, line, 3, said);
-    }
-    refused(dir, "study --scenarios cases.csv", 3, "this id belongs to line 2 too");
-}
-
-#[test]
-fn what_shows_one_case_asks_for_a_row_of_a_table_with_several() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    file(dir, "cases.csv", &format!("{HEADER}{}\n{}\n", ROWS[0].0, ROWS[1].0));
-    for hint in ["--sheet", "--row N"] {
-        refused(dir, "check cases.csv --sheet case.html", 2, hint);
-    }
-    ran(dir, "check cases.csv --row 2 --sheet case.html");
-    assert!(dir.join("case.html").exists());
-    refused(dir, "check cases.csv --profiles un-r157,paper", 2, "under one profile");
-    refused(dir, "simulate --table cases.csv", 2, "the table has several cases");
-    refused(dir, "simulate --table cases.csv", 2, "--row N");
 }

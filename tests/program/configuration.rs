@@ -178,82 +178,6 @@ fn every_record_names_every_setting_with_its_source() {
 }
 
 #[test]
-fn the_estimate_of_a_plan_names_the_options_of_the_plan_and_not_those_of_the_command() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    let few = "--config generator.recordings=2 --config generator.duration_s=100";
-    good(dir, &[], &format!("-q fit --parameterizations i --out i.json {few}"));
-    let is = "sample i.json --estimator is --samples 2000 --models FSM --thw 0.6";
-    good(dir, &[], &format!("-q {is} --config sample.crude_lanes=300000 --plan-only --out plan"));
-    good(dir, &[], "-q sample --plan plan/plan.json --out out");
-    let record = json(&dir.join("out/estimate.json"));
-    assert!(record["options"].to_string().contains("\"crude\":300000"), "{}", record["options"]);
-    let settings = record["settings"].as_array().unwrap();
-    let of = |key: &str| settings.iter().any(|of| of["key"] == key);
-    assert_eq!([of("run.threads"), of("sample.crude_lanes"), of("run.profile")], [true, false, false]);
-}
-
-#[test]
-fn mining_is_configured_alike_for_mine_and_study() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    std::fs::write(dir.join("a.toml"), "[mining.lvd]\nmin_peak_deceleration_mps2 = 1e6\n").unwrap();
-    good(dir, &[], "-q tracks --convert data --synth-recordings 2 --config generator.duration_s=120");
-    let kept = |args: &str| {
-        let text = good(dir, &[], &format!("-q mine data --kept {args}"));
-        text.lines().filter(|line| line.contains("_lvd_")).count()
-    };
-    assert!(kept("") > 0);
-    assert_eq!(kept("--config a.toml"), 0);
-    assert_eq!(kept("--config a.toml --config mining.lvd.min_peak_deceleration_mps2="), kept(""));
-    good(dir, &[], "-q study data --backend cpu --categories cut-in,lvd --config a.toml");
-    let record = json(&dir.join("lanesweep-out/run.json"));
-    assert_eq!(record["mining"]["lvd"]["min_peak_deceleration_mps2"], 1e6);
-    let categories = record["categories"].as_array().unwrap();
-    assert!(categories.iter().all(|of| of["category"] != "lvd" || of["kept"] == 0), "{categories:?}");
-}
-
-#[test]
-fn a_wrong_word_is_answered_with_its_place_and_the_nearest_right_one() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    let files = [
-        ("[mining]\nleader_max_thv_s = 2\n", "a.toml, line 2, `mining.leader_max_thv_s`", "`mining.leader_max_thw_s`"),
-        ("[minning]\nleader_max_thw_s = 2\n", "a.toml, line 1, `minning`: there is no such table", "`mining`"),
-        ("[mining.cutin]\n", "a.toml, line 1, `mining.cutin`", "`mining.cut_in`"),
-        ("seed = 3\n", "a.toml, line 1, `seed`: there is no such key", ".seed`"),
-        ("\n[score]\nseed = -1\n", "a.toml, line 3, `score.seed`: -1 cannot be used", "a whole number of at least 0"),
-        ("[score]\nconfidence = 1\n", "line 2, `score.confidence`: 1", "a number above 0 and below 1"),
-        ("[score]\nconfidence = nan\n", "line 2, `score.confidence`: nan", "a number above 0 and below 1"),
-        ("[generator]\nrecordings = 1.5\n", "line 2, `generator.recordings`: 1.5", "a whole number from 1 to 99"),
-        ("[run]\nbackend = \"gppu\"\n", "line 2, `run.backend`: \"gppu\"", "did you mean \"gpu\"?"),
-        ("[run]\nbackend = 3\n", "line 2, `run.backend`: 3", "one of \"auto\", \"cpu\", \"gpu\""),
-        ("[run]\nprofile = \"papr\"\n", "a.toml, line 2, `run.profile`", "did you mean `paper`?"),
-        ("[run]\ndevice = \"pci:zz\"\n", "a.toml, line 2, `run.device`", "no PCI bus id"),
-        ("[mining.cut_out]\nrequire_slower_lead = 1\n", "`mining.cut_out.require_slower_lead`", "true or false"),
-        ("mining = 3\n", "line 1, `mining`: this is a table, not a key", "write [mining]"),
-        ("[score]\nseed = 1\nseed = 2\n", "a.toml, line 3", "duplicate key"),
-        ("[score\n", "a.toml, line 1", "lanesweep config init -"),
-    ];
-    for (text, place, hint) in files {
-        std::fs::write(dir.join("a.toml"), text).unwrap();
-        for verb in ["study", "config show"] {
-            let said = refused(dir, &[], &format!("{verb} --config a.toml"));
-            assert!(said.contains(place) && said.contains(hint), "{text:?}: {said}");
-        }
-    }
-    for (line, place, hint) in [
-        ("config show --config sample.level=2", "--config sample.level=2: `2` cannot be used", ""),
-        ("study --config score.sed=3", "--config score.sed=3", "`score.seed`"),
-        ("study --config score.seed=x", "--config score.seed=x: `x` cannot be used", ""),
-    ] {
-        let said = refused(dir, &[], line);
-        assert!(said.contains(place) && said.contains(hint), "{line}: {said}");
-    }
-    assert_eq!(std::fs::read_dir(dir).unwrap().count(), 1, "nothing was written");
-}
-
-#[test]
 fn what_is_configured_yields_to_a_flag_that_contradicts_it() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
@@ -326,65 +250,9 @@ fn the_schema_has_every_key_with_a_default_in_its_own_range() {
     assert_eq!(schema["additionalProperties"], false);
 }
 
-/// The part of JSON Schema that [`lanesweep config schema profile`] uses.
-fn fits(value: &Value, schema: &Value, at: &str) {
-    match (schema["type"].as_str(), value) {
-        (Some("object"), Value::Object(fields)) => {
-            for key in schema["required"].as_array().into_iter().flatten() {
-                assert!(fields.contains_key(key.as_str().unwrap()), "{at} has no {key}");
-            }
-            for (key, value) in fields {
-                let property = &schema["properties"][key];
-                assert!(property.is_object(), "{at}.{key} is not in the schema");
-                fits(value, property, &format!("{at}.{key}"));
-            }
-        }
-        (Some("array"), Value::Array(items)) => items.iter().for_each(|item| fits(item, &schema["items"], at)),
-        (Some("string"), Value::String(_)) | (Some("boolean"), Value::Bool(_)) => {}
-        (Some("number" | "integer"), Value::Number(number)) => {
-            let number = number.as_f64().unwrap();
-            assert!(schema["minimum"].as_f64().is_none_or(|min| number >= min), "{at}: {number}");
-            assert!(schema["maximum"].as_f64().is_none_or(|max| number <= max), "{at}: {number}");
-        }
-        (kind, value) => panic!("{at} is {value}, the schema says {kind:?}"),
-    }
-}
-
-#[test]
-fn the_profiles_that_ship_fit_the_schema_of_profiles() {
-    let dir = tempfile::tempdir().unwrap();
-    let schema: Value = serde_json::from_str(&good(dir.path(), &[], "config schema profile")).unwrap();
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/profiles");
-    let mut count = 0;
-    for file in std::fs::read_dir(folder).unwrap().flatten() {
-        let profile: Value = toml::from_str(&std::fs::read_to_string(file.path()).unwrap()).unwrap();
-        fits(&profile, &schema, &file.file_name().to_string_lossy());
-        // And one that lacks a key does not.
-        let mut less = profile.clone();
-        less["cchdm"].as_object_mut().unwrap().remove("delay_s");
-        assert!(std::panic::catch_unwind(|| fits(&less, &schema, "")).is_err());
-        count += 1;
-    }
-    assert!(count >= 4);
-}
-
 fn walk(schema: &Value, prefix: &str, each: &mut dyn FnMut(&str, &Value)) {
     for (name, property) in schema["properties"].as_object().into_iter().flatten() {
         let name = if prefix.is_empty() { name.clone() } else { format!("{prefix}.{name}") };
         if property["properties"].is_object() { walk(property, &name, each) } else { each(&name, property) }
-    }
-}
-
-#[test]
-fn counts_of_flags_are_written_as_in_a_configuration_file() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    good(dir, &[], "-q fit --synth-recordings 2 --categories cut-in --parameterizations 2 --out d.json");
-    for (samples, lanes) in
-        [("1000000000", "20,000,000,000 lanes"), ("1e9", "20,000,000,000 lanes"), ("1_000", "20,000 lanes")]
-    {
-        let sample = "-q sample d.json --models FSM,RSS --plan-only --samples";
-        let planned = good(dir, &[], &format!("{sample} {samples} --out {samples}"));
-        assert!(planned.starts_with(lanes), "{samples}: {planned}");
     }
 }

@@ -1,6 +1,6 @@
 //! The figures of a study show the numbers of their tables, and these are the ones that were looked at.
 //!
-//! `LANESWEEP_RENEW_FIGURES=1 cargo test --release --test program figures::` writes the tables again, after a change that
+//! `LANESWEEP_RENEW_FIGURES=1 cargo test --release --test commands figures::` writes the tables again, after a change that
 //! is meant.
 
 use std::fs;
@@ -87,28 +87,4 @@ fn the_tables_of_the_figures_are_those_that_were_looked_at() {
         let line = known.lines().zip(now.lines()).position(|(a, b)| a != b);
         assert!(known == now, "{name} differs first in line {:?}", line.map(|line| line + 1));
     }
-}
-
-/// Also beside variants without a number of parameters, which take part in the choice of cells.
-#[test]
-fn a_mean_over_cells_is_that_of_the_scores_in_the_table() {
-    let dir = tempfile::tempdir().unwrap();
-    let study = "-q study --synth-recordings 6 --categories cut-in --cross-validate --backend cpu";
-    ran(dir.path(), &format!("{study} --out ."));
-    let mut cells = std::collections::BTreeMap::<[String; 2], Vec<(String, Option<f64>)>>::new();
-    for row in csv(&dir.path().join("f1.csv")) {
-        let cell = cells.entry(["model", "criterion"].map(|name| row[name].clone())).or_default();
-        cell.push((row["variant"].clone(), row["f1"].parse().ok()));
-    }
-    let shared: Vec<_> = cells.values().filter(|cell| cell.iter().all(|(_, f1)| f1.is_some())).collect();
-    let mut means = csv(&dir.path().join("f1-by-parameters-cut-in.csv"));
-    means.retain(|row| row["panel"].starts_with("all criteria") && !row["label"].is_empty());
-    let compared = means.len();
-    for row in means {
-        let own = shared.iter().flat_map(|cell| cell.iter()).filter(|(key, _)| *key == row["label"]);
-        let own: Vec<f64> = own.filter_map(|(_, f1)| *f1).collect();
-        let mean = own.iter().sum::<f64>() / own.len() as f64;
-        assert!((mean - row["y"].parse::<f64>().unwrap()).abs() < 1e-9, "{}: {mean}", row["label"]);
-    }
-    assert_eq!(compared, 7, "the paper's parameterizations");
 }

@@ -41,16 +41,3 @@ fn a_study_answers_on_one_screen() {
     }
     assert_fits(&study(dir.path(), "50", &GENERATED).0, 50);
 }
-
-#[test]
-fn a_study_of_one_category_or_model_shows_no_claims_that_it_could_not_compute() {
-    let dir = tempfile::tempdir().unwrap();
-    let page = |args: &[&str]| {
-        study(dir.path(), "120", &[&GENERATED[..], args].concat());
-        std::fs::read_to_string(dir.path().join("lanesweep-out/report.html")).unwrap()
-    };
-    assert!(!page(&["--models", "FSM"]).contains("claims on this data"));
-    let of_one_category = page(&["--categories", "lvd"]);
-    assert!(of_one_category.contains("LVD failures") && !of_one_category.contains("cut-in 2"), "{of_one_category}");
-    assert!(!of_one_category.contains("not computed"), "{of_one_category}");
-}

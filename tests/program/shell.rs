@@ -40,18 +40,6 @@ fn completions_of_every_shell_know_every_verb_and_bash_can_read_its_own() {
 }
 
 #[test]
-fn every_verb_has_a_manual_page() {
-    let dir = tempfile::tempdir().unwrap();
-    ran(dir.path(), "config man man1");
-    for verb in verbs() {
-        let page = std::fs::read_to_string(dir.path().join(format!("man1/lanesweep-{verb}.1"))).unwrap();
-        assert!(page.contains(".SH NAME") && page.contains(".SH SYNOPSIS") && page.contains(".SH RUN"), "{verb}");
-        assert!(page.contains("Example"), "{verb} has no example");
-    }
-    assert!(dir.path().join("man1/lanesweep.1").exists());
-}
-
-#[test]
 fn the_help_of_every_verb_says_what_it_is_for_and_ends_with_an_example() {
     for verb in verbs() {
         let help = ran(Path::new("."), &format!("{verb} --help"));

@@ -6,11 +6,10 @@ use lanesweep::engine::{CpuBackend, Executor, Headway};
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
-use lanesweep::run::parts::Shard;
 use lanesweep::run::sampling::{EstimateRow, Estimator, Sample, SampleHeadways, SampleOptions};
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::DensityModel;
-use lanesweep::stats::estimate::{Search, Verdict, Warning};
+use lanesweep::stats::estimate::{Verdict, Warning};
 
 fn density_of(key: &str, with_thw: bool) -> DensityModel {
     fitted(scenarios_of(30), Category::CutIn, key, with_thw)
@@ -85,27 +84,6 @@ fn a_rate_that_nothing_is_compared_with_is_not_sound() {
         assert!(row.recorded.is_none() && !is_sound(&row), "{row:?}");
         assert!(row.estimate.trust.warnings.contains(&Warning::NotCompared));
     }
-}
-
-#[test]
-fn importance_sampling_stands_beside_the_replayed_scenarios_too() {
-    for row in rows(&sample(density("3"), Estimator::Search(Search::default()), vec![Headway::ThwS(0.6)])) {
-        let ratios = row.recorded.unwrap();
-        assert!(ratios.sampled.is_none() && (ratios.replayed.agrees() || is_flagged(&row)), "{row:?}");
-    }
-}
-
-#[test]
-fn shards_find_the_same_ratios_as_the_run_in_one_piece() {
-    let sample = sample(density("2"), Estimator::CRUDE, vec![Headway::ThwS(0.6), Headway::ThwS(0.4)]);
-    let dir = tempfile::tempdir().unwrap();
-    let backend = CpuBackend::lane_arithmetic();
-    for index in 0..2 {
-        sample.run_shard(dir.path(), Shard { index, of: 2 }, &Executor::new(&backend)).unwrap();
-    }
-    let (_, merged) = Sample::merge_parts(dir.path(), &|shard| shard.to_string()).unwrap();
-    assert_eq!(merged.rows, rows(&sample));
-    assert!(merged.rows.iter().all(|row| row.recorded.is_some()));
 }
 
 #[test]

@@ -8,9 +8,7 @@ use crate::common::{self, page, program};
 mod machine;
 mod workers;
 
-use crate::common::program::{
-    command, ended, files, limited, names, ran, said, start, unbroken, wait_for_run, without_times, words,
-};
+use crate::common::program::{ended, files, limited, names, ran, start, unbroken, wait_for_run, without_times, words};
 
 use std::path::{Path, PathBuf};
 
@@ -83,21 +81,6 @@ fn at_a_limit_of_the_size_of_files_the_run_says_so_and_ends_well_without_it() {
 }
 
 #[test]
-fn a_full_standard_output_is_told_and_the_result_is_whole() {
-    if !Path::new("/dev/full").exists() {
-        return common::skipped("needs /dev/full");
-    }
-    let bench = Bench::new();
-    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
-    let study = format!("{STUDY} --out study");
-    let output = command(bench.path(), &words(&study)).stdout(full).output().unwrap();
-    let said = unbroken(&output.stderr);
-    assert_eq!(output.status.code(), Some(6), "{said}");
-    assert!(said.contains("standard output") && said.contains("No space left"), "{said}");
-    bench.ends_well("study", STUDY);
-}
-
-#[test]
 fn a_folder_that_vanishes_in_mid_run_is_told_or_made_again_and_nothing_is_claimed_that_is_lost() {
     let bench = Bench::new();
     let out = bench.path().join("sample");
@@ -121,65 +104,4 @@ fn a_folder_that_vanishes_in_mid_run_is_told_or_made_again_and_nothing_is_claime
         same(&out, &shared().join("sample"));
         std::fs::remove_dir_all(&out).unwrap();
     }
-}
-
-#[test]
-fn an_output_that_is_a_file_or_inside_one_is_refused_before_the_work() {
-    let bench = Bench::new();
-    let dir = bench.path();
-    ran(dir, "-q tracks --convert recordings --synth-recordings 1 --config generator.duration_s=60");
-    std::fs::write(dir.join("taken"), "mine").unwrap();
-    let study = "study --scenarios scenarios.jsonl --out";
-    let is_file = &["a file is where a folder is needed"][..];
-    let no_run = &["expected the folder of a run", "there is no such folder", "there is no run here", is_file[0]][..];
-    for place in ["taken", "taken/inside", "taken/far/inside"] {
-        for (line, hints) in [
-            (format!("{study} {place}"), is_file),
-            (format!("{study} {place} --plan-only"), is_file),
-            (format!("{study} {place} --shard 0/2"), is_file),
-            (format!("fit --scenarios scenarios.jsonl --out {place}"), is_file),
-            (format!("merge {place}"), no_run),
-            (format!("simulate --from {place} --lane a/S/1.0s/FSM"), no_run),
-        ] {
-            let (code, said) = said(dir, &line);
-            assert!([2, 3, 6].contains(&code) && said.contains("taken"), "{line}: {code} {said}");
-            assert!(hints.iter().any(|text| said.contains(text)), "{line}: {said}");
-        }
-    }
-    for (line, hint) in [
-        (format!("{study} fresh --rows taken/lanes.csv"), is_file[0]),
-        ("mine recordings --out taken/scenarios.jsonl".to_owned(), is_file[0]),
-        (format!("{study} fresh --rows recordings"), "folder"),
-        ("mine recordings --out .".to_owned(), "folder"),
-    ] {
-        let (code, said) = said(dir, &line);
-        assert!([2, 6].contains(&code) && said.contains(hint), "{line}: {code} {said}");
-    }
-    assert_eq!(std::fs::read_to_string(dir.join("taken")).unwrap(), "mine");
-}
-
-/// A clock that is set while a run is at work can change nothing: nobody looks at it. Waiting and time limits follow
-/// the monotonic clock (`Instant`), results hold no dates.
-#[test]
-fn nothing_reads_the_clock_of_the_day() {
-    let mut files = vec![PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("src")];
-    let mut seen = 0;
-    while let Some(path) = files.pop() {
-        if path.is_dir() {
-            files.extend(std::fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path()));
-            continue;
-        }
-        let text = std::fs::read_to_string(&path).unwrap();
-        seen += 1;
-        for word in ["SystemTime", "UNIX_EPOCH", ".modified()", ".accessed()", ".created()", "chrono", "now_utc"] {
-            // An input that is saved while it is read has another time: compared with itself, not with the day's.
-            let is_itself = word == ".modified()" && path.ends_with("support/input_file.rs");
-            assert!(
-                is_itself || !text.contains(word),
-                "{}: {word}: a clock that jumps would change the run",
-                path.display()
-            );
-        }
-    }
-    assert!(seen > 200, "{seen} files");
 }

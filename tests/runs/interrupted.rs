@@ -2,16 +2,15 @@
 #![cfg(unix)]
 
 use std::io::{BufRead, BufReader};
-use std::ops::Range;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::common::program::{self, PATIENCE, kill, names, ran, send, start, wait_for_run, wait_until, words};
+use crate::common::program::{self, PATIENCE, names, send, start, wait_for_run, wait_until, words};
 use lanesweep::Error;
 use lanesweep::cli::signals;
 use lanesweep::engine::verify::{SetOptions, random_plan};
-use lanesweep::engine::{Backend, Chunk, CpuBackend, Executor, LanePlan, Session, Verdicts, Wanted};
+use lanesweep::engine::{CpuBackend, Executor, Wanted};
 use lanesweep::model::profile::Profile;
 use lanesweep::support::cancel::Cancel;
 
@@ -24,41 +23,6 @@ fn unfinished(dir: &Path) -> Vec<String> {
 fn ended(mut run: Child) -> (i32, String) {
     wait_until("the process ends", || run.try_wait().unwrap().is_some());
     program::ended(run)
-}
-
-#[test]
-fn importance_sampling_that_is_killed_resumes_with_its_search_to_the_same_bits() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    let small = "--synth-recordings 2 --categories cut-in --parameterizations 2 --config fit.valid_draws=1000";
-    ran(dir, &format!("-q fit {small} --out d.json"));
-    let run =
-        "-q --threads 1 sample d.json --estimator is --models FSM,RSS --thw 0.6 --samples 200000 --backend cpu --out";
-    ran(dir, &format!("{run} whole"));
-    let (killed, search) = (dir.join("killed"), dir.join("killed/search.json"));
-    let journal = || names(&killed).into_iter().find(|name| name.ends_with(".journal"));
-    let length = || journal().and_then(|name| std::fs::metadata(killed.join(name)).ok()).map_or(0, |file| file.len());
-    let (mut kills, mut found) = (0, Vec::new());
-    loop {
-        let mut child = start(dir, &words(&format!("{run} killed")));
-        let before = length();
-        let mut status = None;
-        wait_until("the journal grows, or the run ends", || {
-            status = child.try_wait().unwrap();
-            status.is_some() || (kills < 2 && length() > before.max(100))
-        });
-        if let Some(status) = status {
-            assert!(status.success());
-            break;
-        }
-        kill(child);
-        kills += 1;
-        found.push(std::fs::read(&search).unwrap());
-    }
-    assert!(kills > 0, "the run ended before its journal was seen");
-    assert!(found.windows(2).all(|two| two[0] == two[1]), "the search is kept");
-    assert!(!search.exists() && journal().is_none(), "nothing of the run is left");
-    super::parts::same(&killed, &dir.join("whole"));
 }
 
 /// A study that is sent `signal` while it writes its lanes.
@@ -148,7 +112,7 @@ fn a_study_that_is_interrupted_leaves_no_half_written_file() {
 #[test]
 fn a_resumable_run_notes_the_first_signal_and_ends_at_once_by_the_second() {
     let mut run = Command::new(std::env::current_exe().unwrap())
-        .args(["--exact", "interrupted::the_resumable_run", "--nocapture"])
+        .args(["--exact", "runs::interrupted::the_resumable_run", "--nocapture"])
         .env(RESUMABLE_RUN, "1")
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
@@ -222,68 +186,4 @@ fn a_sweep_whose_owner_cancels_it_ends_after_the_chunk_and_keeps_nothing() {
     assert_eq!(chunks, 3);
     cancel.withdraw();
     assert!(executor.sweep(&plan, 0..plan.unit_count(), Wanted::Verdicts, |_| Ok(())).is_ok());
-}
-
-/// Says what it was asked for and computes nothing; its chunks are those of the CPU.
-struct Asked(Box<dyn Backend>);
-
-struct AskedSession<'p>(&'p LanePlan, Box<dyn Session + 'p>);
-
-impl Backend for Asked {
-    fn describe(&self) -> String {
-        "a backend that computes nothing".to_owned()
-    }
-
-    fn prepare<'p>(&self, plan: &'p LanePlan) -> lanesweep::Result<Box<dyn Session + 'p>> {
-        Ok(Box::new(AskedSession(plan, self.0.prepare(plan)?)))
-    }
-}
-
-impl Session for AskedSession<'_> {
-    fn run(&mut self, units: Range<u64>, _: Wanted) -> lanesweep::Result<Chunk> {
-        let first_lane = self.0.first_lane_of(units.start);
-        let verdicts = vec![Verdicts::default(); (self.0.first_lane_of(units.end) - first_lane) as usize];
-        let outcomes = Vec::new();
-        Ok(Chunk { units, first_lane, verdicts, outcomes, counted: None, redone_and_rechecked: [0; 2] })
-    }
-
-    fn chunk_lanes(&self, wanted: Wanted) -> u64 {
-        self.1.chunk_lanes(wanted)
-    }
-}
-
-/// A run looks between two chunks whether it is to end. The work of a chunk is bounded in lane-steps, whatever the time
-/// step: per thread 2^29 in batches and 2^25 of single lanes, or one unit where it has more.
-#[test]
-fn the_work_between_two_looks_is_bounded_whatever_the_time_step() {
-    type Make = fn() -> Box<dyn Backend>;
-    let backends: [(Make, u64); 3] = [
-        (|| Box::new(CpuBackend::lane_arithmetic()), 1 << 29),
-        (|| Box::new(CpuBackend::scalar()), 1 << 25),
-        (|| Box::new(CpuBackend::reference()), 1 << 25),
-    ];
-    for dt_s in [0.1, 0.04, 0.01, 0.001, 0.0001] {
-        let profile = Profile::load("paper").unwrap().with_dt(dt_s).unwrap();
-        let options = SetOptions { size: 50, ..Default::default() };
-        let plan = random_plan(&profile, &options).unwrap();
-        let steps = u64::from(plan.profile.step_cap());
-        for (backend, bound) in &backends {
-            for threads in [1, 2] {
-                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-                let mut units = 0;
-                let run = || {
-                    let backend = Asked(backend());
-                    Executor::new(&backend).sweep(&plan, 0..plan.unit_count(), Wanted::Verdicts, |chunk| {
-                        let work = chunk.lanes() * steps;
-                        let in_chunk = chunk.units.end - chunk.units.start;
-                        assert!(work <= bound * threads as u64 || in_chunk == 1, "{dt_s} s: {work} lane-steps");
-                        units += in_chunk;
-                        Ok(())
-                    })
-                };
-                pool.install(run).unwrap();
-                assert_eq!(units, plan.unit_count());
-            }
-        }
-    }
 }

@@ -1,5 +1,5 @@
 //! Files that runs leave and read again, changed at random: refused, or of no effect. 60 changes by default; the long form is
-//! `LANESWEEP_MUTATED_INPUTS=2000 cargo test --release --test runs mutations:: -- --nocapture`.
+//! `LANESWEEP_MUTATED_INPUTS=2000 cargo test --release --test commands mutations:: -- --nocapture`.
 
 use std::collections::BTreeMap;
 

@@ -1,7 +1,6 @@
-//! What a run must never do to its user's files. What a folder of results keeps, replaces and refuses is tested in
-//! `support/run_folder.rs`, locks in `support/lock.rs`.
+//! What a run must never do to its user's files. Locks are in `mechanisms.rs`.
 
-use crate::common::program::{json, names, ran, refused, said};
+use crate::common::program::{json, names, ran, refused};
 use crate::common::{self, program};
 
 use std::path::Path;
@@ -10,11 +9,6 @@ use std::process::Stdio;
 /// The golden scenarios as `s.jsonl`.
 fn scenarios(dir: &Path) {
     std::fs::copy(common::golden("paper_sumo_01_02_scenarios.jsonl"), dir.join("s.jsonl")).unwrap();
-}
-
-/// A density as `d.json`.
-fn density(dir: &Path) {
-    ran(dir, "-q fit --synth-recordings 2 --categories cut-in --parameterizations 2 --out d.json");
 }
 
 fn read(path: &Path) -> String {
@@ -71,13 +65,6 @@ fn a_reader_that_goes_away_loses_no_result() {
 }
 
 #[test]
-fn one_folder_is_not_given_two_runs() {
-    let dir = tempfile::tempdir().unwrap();
-    refused(dir.path(), "tracks a.csv --out t --convert ./t", 2, "is the folder of --out too");
-    assert!(!dir.path().join("t").exists());
-}
-
-#[test]
 fn a_foreign_index_of_exported_scenarios_and_a_file_of_their_name_stay() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
@@ -93,45 +80,7 @@ fn a_foreign_index_of_exported_scenarios_and_a_file_of_their_name_stay() {
     }
 }
 
-#[cfg(unix)]
-#[test]
-fn a_search_and_manual_pages_replace_no_file_of_the_users_and_follow_no_link() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    density(dir);
-    let sample = "-q sample d.json --estimator is --samples 1000 --models RSS --thw 0.6 --out out";
-    let search = dir.join("out/search.json");
-    std::fs::create_dir(dir.join("out")).unwrap();
-    std::fs::write(&search, "mine").unwrap();
-    refused(dir, sample, 2, "search.json");
-    assert_eq!(read(&search), "mine");
-    std::fs::remove_file(&search).unwrap();
-    std::fs::create_dir(dir.join("man1")).unwrap();
-    std::fs::write(dir.join("precious"), "mine").unwrap();
-    for (link, run) in [(search, sample), (dir.join("man1/lanesweep-study.1"), "config man man1")] {
-        std::os::unix::fs::symlink(dir.join("precious"), link).unwrap();
-        let (code, said) = said(dir, run);
-        assert!(code == 3 && said.contains("this is a link"), "{said}");
-        assert_eq!(read(&dir.join("precious")), "mine");
-    }
-}
-
-#[test]
-fn lanes_of_a_run_without_its_density_say_how_to_get_it_back() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    density(dir);
-    ran(dir, "-q sample d.json --samples 500 --thw 0.6 --models FSM --out out");
-    // The density of the run, damaged and missing: what makes it again is the run.
-    let simulate = "simulate --from out --lane #77/2/0.6s/FSM";
-    ran(dir, simulate);
-    std::fs::write(dir.join("out/density.json"), "{}").unwrap();
-    refused(dir, simulate, 3, "run `lanesweep sample` into this folder again");
-    std::fs::remove_file(dir.join("out/density.json")).unwrap();
-    refused(dir, simulate, 3, "density.json: the density of the run is missing");
-}
-
-/// Of each way of writing, a file; the others are in `support/run_folder.rs`.
+/// Of each way of writing, a file.
 #[cfg(unix)]
 #[test]
 fn a_folder_from_somebody_else_makes_no_run_write_elsewhere() {
@@ -175,38 +124,6 @@ fn a_journal_replaces_no_file_of_the_users_and_has_one_writer() {
     refused(dir, study, 75, "another lanesweep process");
     drop(held);
     ran(dir, study);
-}
-
-#[test]
-fn values_that_no_lane_can_hold_are_refused_with_their_line() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    let golden = read(&common::golden("paper_sumo_01_02_scenarios.jsonl"));
-    std::fs::write(dir.join("s.jsonl"), golden.replacen("\"v0\":34.39", "\"v0\":1e300", 1)).unwrap();
-    let (code, said) = said(dir, "study --scenarios s.jsonl --out out");
-    assert!(code == 4 && said.contains("line 1") && said.contains("ego.v0"), "{said}");
-    let simulate = "simulate --category lvd --models FSM --ego-speed 30m/s --gap 1e300 --acceleration=-5";
-    refused(dir, simulate, 2, "at most 1e6");
-}
-
-#[test]
-fn flags_that_would_not_be_heeded_and_absurd_numbers_of_threads_are_refused() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    scenarios(dir);
-    let lane = "--lane 01_cut_in_81_74_836/S/1.2s/RSS";
-    let dt = "--config run.dt_s=0.05";
-    let check = "check --category lvd --ego-speed 30m/s --thw 1 --acceleration -6";
-    for (line, hint) in [
-        (&*format!("simulate --scenarios s.jsonl {lane} --gap 5"), "would be ignored"),
-        ("study --threads 100000000", "expected a whole number from 1 to"),
-        (&format!("simulate --from run {lane} {dt}"), "`run.dt_s` is decided by the run"),
-        (&format!("{check} {dt}"), "`run.dt_s` has no effect on a check"),
-        ("study --synth-recordings 2 --scenarios s.jsonl", "cannot be used with"),
-        ("study --synth-recordings 2 recordings", "cannot be used with"),
-    ] {
-        refused(dir, line, 2, hint);
-    }
 }
 
 /// What a folder of results or a document says of its data.

@@ -1,13 +1,11 @@
 //! `--thw observed`: each scenario from its recorded gap.
 
 use crate::common::mined::{fitted, kept, mined, scenarios_of};
-use crate::common::program::ran;
 use lanesweep::Error;
-use lanesweep::engine::{CpuBackend, Executor, Headway, LaneKey, LaneRunner};
+use lanesweep::engine::{Headway, LaneKey, LaneRunner};
 use lanesweep::model::profile::Profile;
-use lanesweep::run::parts::{Job, Shard};
 use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, plan_samples};
-use lanesweep::run::study::{Study, StudyOptions, plan_study};
+use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::Category;
 
 fn observed() -> StudyOptions {
@@ -41,20 +39,6 @@ fn s_and_every_s_prime_start_from_the_recorded_gap() {
 }
 
 #[test]
-fn shards_from_recorded_gaps_give_the_counts_of_the_whole() {
-    let data = mined(2);
-    let study = Study::builder(&data, Profile::load("paper").unwrap()).options(observed()).plan().unwrap();
-    let backend = CpuBackend::lane_arithmetic();
-    let executor = Executor::new(&backend);
-    let dir = tempfile::tempdir().unwrap();
-    for index in 0..3 {
-        study.run_shard(dir.path(), Shard { index, of: 3 }, &executor).unwrap();
-    }
-    let (_, result) = Study::merge_parts(dir.path(), &|shard| shard.to_string()).unwrap();
-    assert_eq!(result.counts, study.run(&executor).unwrap().counts);
-}
-
-#[test]
 fn a_scenario_without_a_recorded_gap_is_named_and_a_mixture_of_headways_is_refused() {
     let mut data = mined(1);
     let scenario = data.scenarios.iter_mut().find(|s| s.kept).unwrap();
@@ -76,15 +60,4 @@ fn a_density_without_headways_cannot_draw_observed_ones() {
     let paper = Profile::load("paper").unwrap();
     let error = plan_samples(&density, &paper, &options).err().unwrap();
     assert!(error.help().unwrap_or_default().contains("with_thw"), "{error}");
-}
-
-#[test]
-fn every_verb_takes_observed_headways() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    let small = "--synth-recordings 4 --config generator.duration_s=300";
-    let answer = ran(dir, &format!("-q study --thw observed --backend cpu --out study {small}"));
-    assert!(answer.contains("recorded THW"), "{answer}");
-    ran(dir, &format!("-q fit --parameterizations i --with-thw --out i.json {small}"));
-    ran(dir, "-q sample i.json --samples 2000 --thw observed --backend cpu --out sample");
 }

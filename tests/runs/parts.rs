@@ -1,6 +1,6 @@
 //! Runs in parts: whatever the number and order of shards, and wherever a run was interrupted, the result is that of
-//! the undisturbed run, byte for byte; a folder that cannot give it says what is missing. Missing and doubled parts are in
-//! `run/parts/folder.rs`, damaged files in `run/parts/sealed.rs`, intervals of a plan in `run/study/read.rs`.
+//! the undisturbed run, byte for byte; a folder that cannot give it says what is missing. Journal, lock and the numbers of
+//! shards by themselves are in `mechanisms.rs`.
 
 use crate::common::program::{
     self, flat, json, kill, lanesweep, limited, ran, refused, start, unbroken, wait_for_run, without_host, words,
@@ -44,7 +44,7 @@ fn a_study_in_shards_is_the_study_in_one_piece() {
     assert_eq!(std::fs::metadata(&part).unwrap().modified().unwrap(), before);
     ran(dir, "-q merge three");
     same(&dir.join("whole"), &dir.join("three"));
-    // From one plan: the data are not read again. Shards without a unit are in `run/parts/folder.rs`.
+    // From one plan: the data are not read again.
     ran(dir, &format!("{STUDY} --out plan --plan-only"));
     let read = |path: &str| std::fs::read(dir.join(path)).unwrap();
     assert!(read("whole/run-plan.json") == read("plan/plan.json"), "the plan that a whole run leaves is the same file");

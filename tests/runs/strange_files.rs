@@ -74,30 +74,6 @@ fn pipes_folders_and_devices_are_refused_at_once_wherever_a_file_is_read() {
 }
 
 #[test]
-fn strange_files_inside_a_folder_that_is_named_are_refused_at_once() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    std::fs::create_dir(dir.join("out")).unwrap();
-    for (name, line) in [
-        ("plan.json", "merge out"),
-        ("estimate.json", "simulate --from out --lane a/S/1.0s/FSM"),
-        // Where the program would leave its own.
-        ("plan.json", "study --synth-recordings 1 --config generator.duration_s=120 --out out --plan-only"),
-    ] {
-        pipe(&dir.join("out").join(name));
-        refused(dir, line, &[name, "expected a regular file"]);
-        std::fs::remove_file(dir.join("out").join(name)).unwrap();
-    }
-    for name in ["01_tracks.csv", "01_tracksMeta.csv", "01_recordingMeta.csv"] {
-        recording(dir);
-        std::fs::remove_file(dir.join("in").join(name)).unwrap();
-        pipe(&dir.join("in").join(name));
-        refused(dir, "mine in", &[name, "expected a regular file"]);
-        std::fs::remove_dir_all(dir.join("in")).unwrap();
-    }
-}
-
-#[test]
 fn a_line_that_does_not_end_is_given_up_and_named() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
@@ -178,52 +154,6 @@ fn plans_parts_journals_and_densities_that_are_zeros_or_cut_off_are_refused_with
     let (code, said, took) = run(&format!("{sample} --shard 1/2"));
     assert!(code == 3 && said.contains("no journal of lanesweep") && took < Duration::from_secs(2), "{code} {said}");
     assert_eq!(std::fs::metadata(&journal).unwrap().len(), 1 << 30, "a foreign file stays");
-}
-
-#[test]
-fn no_message_repeats_a_text_of_any_size() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    let long = "k".repeat(900_000);
-    scenarios_with(dir, &long);
-    for (name, text) in [
-        ("key.toml", format!("{long} = 1\n")),
-        ("table.toml", format!("[{long}]\na = 1\n")),
-        ("value.toml", format!("[run]\nbackend = \"{long}\"\n")),
-        ("huge.toml", format!("# {long}{long}\n")),
-        ("columns.csv", format!("id,{long}\na,1\n")),
-        ("cell.csv", format!("id,category\na,{long}\n")),
-    ] {
-        std::fs::write(dir.join(name), text).unwrap();
-    }
-    let word = "w".repeat(100_000);
-    for (line, code, expected) in [
-        ("config check key.toml", 2, "this key has 900000 bytes"),
-        ("config check table.toml", 2, "bytes"),
-        ("config check value.toml", 2, "line 2"),
-        ("config check huge.toml", 3, "more than 1 MiB"),
-        ("study --config key.toml", 2, "key.toml, line 1"),
-        ("study --profile key.toml", 2, "key.toml, line 1"),
-        ("study --scenarios s.jsonl --out o", 4, "expected at most 512"),
-        ("study --scenarios columns.csv --out o", 3, "columns.csv"),
-        ("study --scenarios cell.csv --out o", 3, "cell.csv"),
-        ("check columns.csv", 2, "columns.csv"),
-        ("check cell.csv", 2, ""),
-        ("study --categories @", 2, "no category"),
-        ("study --config @=1", 2, "key"),
-        ("study --dt @", 2, "--dt"),
-        ("study @", 3, "cannot read"),
-        ("study --device @", 2, "--device"),
-        ("study --@", 2, "unexpected argument"),
-        ("@", 2, "unrecognized subcommand"),
-        ("simulate --scenarios s.jsonl --lane @", 3, "s.jsonl"),
-    ] {
-        let started = Instant::now();
-        let (status, said) = said(dir, &words(&line.replace('@', &word)));
-        assert!(said.len() < 3000, "{line}: {} bytes: {said:.300}", said.len());
-        assert!([code, 2, 3, 7].contains(&status) && said.contains(expected), "{line}: {status} {said}");
-        assert!(started.elapsed() < Duration::from_secs(5), "{line}: {:?}", started.elapsed());
-    }
 }
 
 /// An id that acts on a terminal, forges a line of a message, turns the direction of reading, and is a formula.

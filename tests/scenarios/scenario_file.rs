@@ -130,30 +130,6 @@ fn a_byte_order_mark_windows_line_ends_and_empty_lines_are_accepted() {
 }
 
 #[test]
-fn unknown_fields_are_ignored_and_optional_ones_may_be_absent() {
-    let text = line(|v| {
-        v["note"] = "mine".into();
-        for field in ["recording", "ego_id", "frame0", "kept", "lane_width", "thw0", "end_cause"] {
-            v.as_object_mut().unwrap().remove(field);
-        }
-    });
-    let read = &read_scenarios(file(text).path()).unwrap()[0];
-    assert!(read.kept && read.lane_width == 3.5 && read.thw0.is_none());
-}
-
-#[test]
-fn what_is_not_json_is_refused_with_its_line() {
-    let good = line(|_| ());
-    let message = refused(format!("{good}\n{}", &good[..good.len() / 2]));
-    assert!(message.contains("line 2") && message.contains("not JSON"), "{message}");
-    let nan = good.replacen("25.0", "NaN", 1);
-    assert!(refused(nan).contains("not JSON"));
-    assert!(refused(good.replacen("25.0", "1e999", 1)).contains("number out of range"));
-    assert!(refused("[1, 2]").contains("not a scenario"));
-    assert!(refused(b"{\xff}").contains("UTF-8"));
-}
-
-#[test]
 fn what_cannot_be_a_scenario_is_refused_by_field() {
     for field in ["category", "fps", "ego", "side", "target"] {
         let message = refused_change(|v| drop(v.as_object_mut().unwrap().remove(field)));
@@ -195,13 +171,6 @@ fn what_cannot_be_a_scenario_is_refused_by_field() {
 }
 
 #[test]
-fn an_id_that_came_before_is_refused_with_both_lines() {
-    let text = format!("{}\n\n{}\n", line(|_| ()), line(|_| ()));
-    let message = refused(text);
-    assert!(message.contains("line 3") && message.contains("line 1") && message.contains("`id`"), "{message}");
-}
-
-#[test]
 fn a_file_without_scenarios_and_a_missing_file_are_refused() {
     for empty in ["", "\n\n", "\u{feff}\r\n"] {
         assert!(refused(empty).contains("holds no scenario"));
@@ -222,15 +191,4 @@ fn nan_is_never_written_and_a_failed_write_leaves_the_old_file() {
     assert!(error.contains("target.y[2]") && error.contains("01_cut_out_5_4_77"), "{error}");
     assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary file stays");
-}
-
-#[cfg(unix)]
-#[test]
-fn a_written_file_has_the_permissions_of_a_new_file() {
-    use std::os::unix::fs::PermissionsExt;
-    let folder = tempfile::tempdir().unwrap();
-    let mode = |path: &Path| std::fs::metadata(path).unwrap().permissions().mode();
-    write_scenarios(&folder.path().join("a"), &[cut_out()]).unwrap();
-    std::fs::write(folder.path().join("b"), "").unwrap();
-    assert_eq!(mode(&folder.path().join("a")), mode(&folder.path().join("b")));
 }

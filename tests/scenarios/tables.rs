@@ -3,7 +3,7 @@
 #![cfg(feature = "parquet")]
 
 use crate::common::mined::{fitted, scenarios_of};
-use crate::common::program::{json, ran, refused};
+use crate::common::program::{json, ran};
 use crate::common::tables::made;
 
 use std::collections::BTreeMap;
@@ -212,20 +212,6 @@ fn check_facts(table: &Read, kind: &str, has_lanes: bool) {
     }
     if kind != "samples" {
         assert_eq!(rows.len(), words.len(), "the section on {kind} has rows for columns that are not written");
-    }
-}
-
-#[test]
-fn an_ending_that_is_unknown_is_answered_with_the_known_ones_before_any_work() {
-    let dir = tempfile::tempdir().unwrap();
-    ran(dir.path(), "-q tracks --convert rec --synth-recordings 1 --config generator.duration_s=60");
-    for (line, hint) in [
-        ("study --rows lanes.xlsx", ".csv, .jsonl or .parquet"),
-        ("mine rec --out s.csv", ".jsonl or .parquet"),
-        ("study --scenarios s.xml", ".jsonl, .parquet or .csv"),
-        ("simulate --table cases.jsonl", ".csv or .parquet"),
-    ] {
-        refused(dir.path(), line, 2, hint);
     }
 }
 

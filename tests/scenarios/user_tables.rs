@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use arrow_array::{ArrayRef, BooleanArray, Date32Array, Float64Array, Int32Array, StringArray, StructArray};
 use arrow_schema::{DataType, Field};
-use lanesweep::scenario::{Category, Scenario, Side, read_scenarios};
+use lanesweep::scenario::{Category, Scenario, Side, read_scenario_file, read_scenarios};
 use parquet::basic::Compression;
 
 fn file(dir: &Path, name: &str, content: &str) -> PathBuf {
@@ -81,19 +81,15 @@ fn a_row_per_instant_makes_scenarios_with_converted_units_and_the_rate_of_their_
 #[test]
 fn a_cut_in_that_moves_away_or_stands_on_the_other_side_is_told_by_name() {
     let dir = tempfile::tempdir().unwrap();
-    let warned = |name: &str, content: &str| {
-        file(dir.path(), name, content);
-        let (code, said) = said(dir.path(), &format!("study --scenarios {name} --plan-only --out of-{name}"));
-        assert_eq!(code, 0, "{said}");
-        said
+    let notes = |content: &str| {
+        let read = read_scenario_file(&file(dir.path(), "s.csv", content), Default::default()).unwrap();
+        read.notes.join("; ")
     };
-    let away = INSTANTS.replace("72,3.5", "72,2.75").replace("72,3.4", "72,3.1").replace("90,3.3", "90,3.4");
-    let away = warned("away.csv", &away);
+    let away = notes(&INSTANTS.replace("72,3.5", "72,2.75").replace("72,3.4", "72,3.1").replace("90,3.3", "90,3.4"));
     assert!(away.contains("move away from the ego's lane") && away.contains("the first is scenario a"), "{away}");
-    let other_side = INSTANTS.replace("72,3.", "72,-3.").replace("90,3.", "90,-3.");
-    assert!(warned("side.csv", &other_side).contains("against their `side`, the first is scenario a"));
-    let good = warned("good.csv", INSTANTS);
-    assert!(!good.contains("lane change(s)"), "{good}");
+    let other_side = notes(&INSTANTS.replace("72,3.", "72,-3.").replace("90,3.", "90,-3."));
+    assert!(other_side.contains("against their `side`, the first is scenario a"), "{other_side}");
+    assert!(!notes(INSTANTS).contains("lane change(s)"));
 }
 
 #[test]
@@ -323,24 +319,6 @@ fn what_is_wrong_with_a_table_of_series_is_told_with_row_scenario_and_column() {
 }
 
 #[test]
-fn simulate_takes_a_row_of_a_parquet_table() {
-    let dir = tempfile::tempdir().unwrap();
-    let columns = vec![
-        ("category", texts(&["lvd", "cut-in"])),
-        ("models", texts(&["RSS", "FSM"])),
-        ("ego_speed_mps", numbers(&[20.0, 30.0])),
-        ("speed_kmh", numbers(&[72.0, 72.0])),
-        ("thw", numbers(&[1.0, 1.2])),
-        ("lateral_speed", numbers(&[f64::NAN, 1.0])),
-    ];
-    made::write(&dir.path().join("cases.parquet"), columns, Compression::SNAPPY);
-    let table = ran(dir.path(), "simulate --table cases.parquet --row 2");
-    let flags = "simulate --category cut-in --models FSM --ego-speed 30m/s --speed 20m/s --thw 1.2 --lateral-speed 1";
-    assert_eq!(table, ran(dir.path(), flags));
-    refused(dir.path(), "simulate --table cases.parquet --row 3", 2, "there is no row 3");
-}
-
-#[test]
 fn a_truncated_parquet_file_is_told_as_one_and_no_panic_is_printed() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("s.parquet");
@@ -434,7 +412,7 @@ fn small_negative_speeds_are_0_in_every_table_and_flag_and_larger_ones_an_error(
     let dir = tempfile::tempdir().unwrap();
     let is_still = |name: &str, content: &str| {
         let path = file(dir.path(), name, content);
-        let read = lanesweep::scenario::read_scenario_file(&path, Default::default()).unwrap();
+        let read = read_scenario_file(&path, Default::default()).unwrap();
         assert!(read.problems.is_empty() && read.notes.len() == 1, "{name}: {:?}", read.notes);
         assert!(read.notes[0].contains("between -0.5 and 0 m/s is taken as 0, once"), "{name}: {:?}", read.notes);
         assert!(read.scenarios.iter().any(|s| s.target.v.contains(&0.0)), "{name}");
@@ -472,25 +450,4 @@ fn small_negative_speeds_are_0_in_every_table_and_flag_and_larger_ones_an_error(
     assert!(code == 0 && text.contains("taken as 0, once: other_speed_mps = -0.01"), "{text}");
     refused(dir.path(), &format!("{map} --set other_speed_mps=-0.5"), 2, "");
     refused(dir.path(), &format!("{map} --set other_speed_mps=108"), 2, "");
-}
-
-#[test]
-fn flags_that_no_road_has_are_refused_with_the_likely_unit_unless_accepted() {
-    let dir = tempfile::tempdir().unwrap();
-    let cut_in = "simulate --category cut-in --models FSM --lateral-speed 1 --thw 1.2 --speed 20m/s --ego-speed";
-    let unit = "108 has no unit: as m/s it is 388.8 km/h, as km/h 30 m/s; write 108km/h or 108m/s";
-    let too_fast = "acceleration: it results in a speed that no vehicle has: 740 m/s";
-    for (more, code, hint) in [
-        ("108", 2, unit),
-        ("108m/s", 2, "108 looks like km/h: 30 m/s"),
-        ("108m/s", 2, "--accept-implausible"),
-        ("108m/s --accept-implausible", 0, "WARN an implausible speed is used as it is"),
-        ("90m/s", 0, "90 looks like km/h: 25 m/s"),
-        ("30m/s --acceleration 6", 2, too_fast),
-        ("30m/s --acceleration 6 --end-speed 40m/s", 0, ""),
-        ("30m/s --length 430", 2, "430 looks like cm: 4.3 m"),
-    ] {
-        let (found, text) = said(dir.path(), &format!("{cut_in} {more}"));
-        assert!(found == code && text.contains(hint), "{more}: {found} {text}");
-    }
 }

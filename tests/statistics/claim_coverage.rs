@@ -2,7 +2,7 @@
 //! simulated studies of populations whose scores are known. Minutes long:
 //!
 //! ```text
-//! cargo test --release --test statistics claim_coverage:: -- --ignored --nocapture
+//! cargo test --release --test library claim_coverage:: -- --ignored --nocapture
 //! ```
 
 use lanesweep::engine::Confusion;
@@ -122,7 +122,7 @@ fn rates(truth: f64, intervals: &[ScoreInterval]) -> [f64; 3] {
 }
 
 #[test]
-#[ignore = "long: cargo test --release --test statistics claim_coverage:: -- --ignored --nocapture"]
+#[ignore = "long: cargo test --release --test library claim_coverage:: -- --ignored --nocapture"]
 fn intervals_of_differences_hold() {
     let pairs =
         [[0.02, 0.02], [0.1, 0.1], [0.3, 0.3], [0.0, 0.02], [0.02, 0.1], [0.1, 0.3]].map(|wrong| (1, wrong.to_vec()));
@@ -199,7 +199,7 @@ fn claim(population: &Population, n: usize, seed: u64) -> [ClaimVerdict; 2] {
 }
 
 #[test]
-#[ignore = "long: cargo test --release --test statistics claim_coverage:: -- --ignored --nocapture"]
+#[ignore = "long: cargo test --release --test library claim_coverage:: -- --ignored --nocapture"]
 fn verdicts_about_claims_are_seldom_wrong() {
     println!(
         "{:30} {:>9} {:>8} | by resampled means: holds, contradicted, undecided, too few, per cent | by our rule",

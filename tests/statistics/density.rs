@@ -148,18 +148,6 @@ fn the_bits_of_a_fit_do_not_depend_on_the_number_of_threads() {
     assert_eq!(bits(&one), bits(&three));
 }
 
-#[test]
-fn a_density_that_cannot_be_told_is_refused_with_the_reason() {
-    let fit = |points: Vec<Vec<f64>>| Kde::fit(points, &names(2), BandwidthRule::Reduction).unwrap_err().to_string();
-    assert!(fit(vec![]).contains("no scenario"));
-    assert!(fit(vec![vec![1.0, 2.0]]).contains("1 scenario cannot"));
-    assert!(fit(vec![vec![1.0, 2.0], vec![2.0, 1.0]]).contains("2 scenarios cannot tell a density of 2 parameters"));
-    let flat = fit(vec![vec![1.0, 2.0], vec![2.0, 2.0], vec![4.0, 2.0]]);
-    assert!(flat.contains("`x2`") && flat.contains("is 2 in all 3 scenarios"), "{flat}");
-    let nan = fit(vec![vec![1.0, 2.0], vec![f64::NAN, 2.5], vec![4.0, 3.0]]);
-    assert!(nan.contains("kernel 2") && nan.contains("`x1`"), "{nan}");
-}
-
 fn kept(category: Category) -> Vec<&'static Scenario> {
     mined::kept(scenarios_of(4), category)
 }
@@ -376,36 +364,6 @@ fn a_density_file_gives_the_same_density_to_the_last_bit() {
         assert!(valid > 100);
         assert_eq!(read.kde.mixture().unwrap().dimensions(), read.space.dimensions());
     }
-}
-
-#[test]
-fn spoiled_density_files_are_told_with_file_and_reason() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("density.json");
-    write_density(&path, &model(Category::CutIn, "1")).unwrap();
-    let good = std::fs::read_to_string(&path).unwrap();
-    let edited = |from: &str, to: &str| {
-        assert!(good.contains(from), "{from}");
-        good.replacen(from, to, 1)
-    };
-    let first_kernel = good.split("\"kernels\": [[").nth(1).unwrap().split(']').next().unwrap().to_owned();
-    for (text, expected) in [
-        (edited("\"lanesweep_density\": 2", "\"lanesweep_density\": 3"), "version 3, but this program reads version 2"),
-        (edited("\"lanesweep_density\": 2,", ""), "`lanesweep_density` is missing"),
-        (edited("\"scale\"", "\"scales\""), "unknown field `scales`"),
-        (edited("\"with_thw\": true,", ""), "missing field `with_thw`"),
-        (edited(&first_kernel, "1e999, 1, 1, 1"), "number out of range"),
-        (edited(&first_kernel, "NaN, 1, 1, 1"), "expected value"),
-        (good.replacen('{', "", 1), "not a density file"),
-        (String::new(), "not a density file"),
-        (good[..good.len() / 2].to_owned(), "not a density file"),
-    ] {
-        std::fs::write(&path, text).unwrap();
-        let error = read_density(&path).unwrap_err().to_string();
-        assert!(error.contains("density.json") && error.contains(expected), "{expected}: {error}");
-    }
-    let absent = read_density(&dir.path().join("absent.json")).unwrap_err();
-    assert!(absent.to_string().contains("absent.json"), "{absent}");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! How often the 95 % intervals hold the truth, over 1,000 seeded repeats of every estimator. Minutes long:
 //!
 //! ```text
-//! cargo test --release --test statistics estimator_coverage:: -- --ignored --nocapture
+//! cargo test --release --test library estimator_coverage:: -- --ignored --nocapture
 //! ```
 
 use lanesweep::engine::Confusion;
@@ -93,7 +93,7 @@ impl Drop for Misses {
 }
 
 #[test]
-#[ignore = "long: cargo test --release --test statistics estimator_coverage:: -- --ignored --nocapture"]
+#[ignore = "long: cargo test --release --test library estimator_coverage:: -- --ignored --nocapture"]
 fn binomial_intervals_hold() {
     heading();
     let mut misses = Misses::default();
@@ -122,7 +122,7 @@ fn binomial_intervals_hold() {
 
 /// A rule that ends where the interval is narrow looks at the sample; looks are few, and a run ends by its failures.
 #[test]
-#[ignore = "long: cargo test --release --test statistics estimator_coverage:: -- --ignored --nocapture"]
+#[ignore = "long: cargo test --release --test library estimator_coverage:: -- --ignored --nocapture"]
 fn binomial_intervals_hold_where_the_half_width_ends_the_sample() {
     heading();
     let mut misses = Misses::default();
@@ -178,7 +178,7 @@ fn problems() -> Vec<Problem> {
 }
 
 #[test]
-#[ignore = "long: cargo test --release --test statistics estimator_coverage:: -- --ignored --nocapture"]
+#[ignore = "long: cargo test --release --test library estimator_coverage:: -- --ignored --nocapture"]
 fn adaptive_importance_sampling_intervals_hold() {
     heading();
     let mut misses = Misses::default();
@@ -244,7 +244,7 @@ fn held(truth: f64, intervals: &[(f64, f64)]) -> f64 {
 }
 
 #[test]
-#[ignore = "long: cargo test --release --test statistics estimator_coverage:: -- --ignored --nocapture"]
+#[ignore = "long: cargo test --release --test library estimator_coverage:: -- --ignored --nocapture"]
 fn intervals_over_scenarios_hold() {
     println!("{:>9} {:>8} | coverage of: draws alone, resampled scenarios, ours", "scenarios", "P");
     let mut missed = Vec::new();
@@ -274,7 +274,7 @@ fn intervals_over_scenarios_hold() {
 }
 
 #[test]
-#[ignore = "long: cargo test --release --test statistics estimator_coverage:: -- --ignored --nocapture"]
+#[ignore = "long: cargo test --release --test library estimator_coverage:: -- --ignored --nocapture"]
 fn intervals_of_f1_hold() {
     println!("{:>9} {:>7} {:>8} | coverage of: resampled scenarios, ours; mean width", "scenarios", "F1", "S fails");
     let mut missed = Vec::new();

@@ -1,6 +1,6 @@
 //! Adaptive importance sampling against crude Monte Carlo with 10⁸ lanes, on mined scenarios.
 //!
-//! The long test: `cargo test --release --test statistics estimators_on_lanes:: -- --ignored --nocapture` (about six minutes on
+//! The long test: `cargo test --release --test library estimators_on_lanes:: -- --ignored --nocapture` (about six minutes on
 //! two cores; LANESWEEP_DLR_HT names a folder of DLR-HT recordings in highD's format).
 
 use crate::common;

@@ -105,28 +105,3 @@ fn sets_that_make_no_density_are_told_apart() {
     assert!(code == 4 && text.contains("too few for a decomposition"), "{code} {text}");
     assert!(dir.path().join("out/lvd-i.json").exists() && !dir.path().join("out/lvd-v.json").exists());
 }
-
-#[test]
-fn wrong_words_are_answered_with_what_to_write_instead() {
-    let dir = tempfile::tempdir().unwrap();
-    std::fs::copy(common::golden("paper_sumo_01_02_scenarios.jsonl"), dir.path().join("input.json")).unwrap();
-    for (flags, code, hint) in [
-        ("--config fit.valid_draws=0", 2, "expected a whole number from 1 to 1000000000"),
-        ("--config fit.valid_draws=1000000001", 2, "expected a whole number from 1 to 1000000000"),
-        ("--parameterizations 9", 2, "there is no parameterization `9`"),
-        ("--parameterizations 9", 2, "LVD: i ii iii iv v"),
-        ("--categories cut-in --parameterizations ii", 2, "of cut-in"),
-        ("--categories cutin", 2, "use cut-in, cut-out, lvd"),
-        ("--config fit.bandwidth_rule=best", 2, "reduction"),
-        ("--hours -1", 2, "--hours"),
-        ("--km nan", 2, "--km"),
-        ("--out one.json", 2, "is one file, but 19 densities"),
-        ("--scenarios no-such-file.jsonl", 3, "no-such-file.jsonl"),
-        ("--scenarios input.json --parameterizations i --out input.json", 2, "would be overwritten"),
-    ] {
-        refused(dir.path(), &format!("fit {flags}"), code, hint);
-    }
-    let help = ran(dir.path(), "fit --help");
-    assert!(help.starts_with("How are the parameters of scenarios distributed?"), "{help}");
-    assert!(help.contains("lanesweep fit recordings --out densities"), "{help}");
-}

@@ -84,39 +84,19 @@ fn a_recording_with_one_file_missing_is_a_problem_and_the_others_are_used() {
 }
 
 #[test]
-fn a_folder_whose_only_recording_lacks_a_file_names_that_file() {
+fn folders_without_a_whole_recording_are_told_apart() {
     let dir = tempfile::tempdir().unwrap();
-    fs::write(dir.path().join("01_tracks.csv"), "").unwrap();
-    let error = highd::inventory(dir.path()).unwrap_err();
-    assert_says(&error, &["recording `01`", "01_tracksMeta.csv and 01_recordingMeta.csv are missing"]);
-    fs::write(dir.path().join("02_tracks.csv"), "").unwrap();
-    let error = highd::inventory(dir.path()).unwrap_err();
-    assert_says(&error, &["none of the 2 recordings is complete", "01_tracksMeta.csv"]);
-}
-
-#[test]
-fn an_empty_folder_a_file_and_a_path_that_is_not_there_are_told_apart() {
-    let dir = tempfile::tempdir().unwrap();
-    let name = dir.path().display().to_string();
-    let error = highd::inventory(dir.path()).unwrap_err();
-    assert_says(&error, &[&name, "no recording", "NN_tracks.csv", "NN_tracksMeta.csv", "NN_recordingMeta.csv"]);
-
-    let file = dir.path().join("01_tracks.csv");
-    fs::write(&file, "").unwrap();
-    assert_says(&highd::inventory(&file).unwrap_err(), &["01_tracks.csv", "this is a file; expected a folder"]);
-
-    let absent = dir.path().join("absent");
-    assert_says(&highd::inventory(&absent).unwrap_err(), &["absent", "cannot read the folder"]);
-}
-
-#[test]
-fn the_folder_around_the_recordings_points_to_the_one_inside() {
-    let dir = tempfile::tempdir().unwrap();
+    let inventory = |path: &std::path::Path| highd::inventory(path).unwrap_err();
+    assert_says(&inventory(dir.path()), &["no recording", "NN_tracks.csv", "NN_tracksMeta.csv"]);
+    assert_says(&inventory(&dir.path().join("absent")), &["absent", "cannot read the folder"]);
     let inner = dir.path().join("data");
     fs::create_dir(&inner).unwrap();
     fs::write(inner.join("01_tracks.csv"), "").unwrap();
-    let error = highd::inventory(dir.path()).unwrap_err();
-    assert!(error.help().unwrap().contains(&inner.display().to_string()), "{:?}", error.help());
+    assert!(inventory(dir.path()).help().unwrap().contains(&inner.display().to_string()));
+    assert_says(&inventory(&inner), &["recording `01`", "01_tracksMeta.csv and 01_recordingMeta.csv are missing"]);
+    assert_says(&inventory(&inner.join("01_tracks.csv")), &["this is a file; expected a folder"]);
+    fs::write(inner.join("02_tracks.csv"), "").unwrap();
+    assert_says(&inventory(&inner), &["none of the 2 recordings is complete", "01_tracksMeta.csv"]);
 }
 
 #[test]
@@ -156,29 +136,111 @@ fn a_renamed_column_is_recognised() {
 }
 
 #[test]
-fn a_column_that_is_there_twice_is_refused() {
-    edited("tracks", |text| text.replacen("yAcceleration", "x", 1), &["line 1", "column `x`", "twice"]);
-}
-
-#[test]
-fn what_is_no_finite_number_is_named_with_line_and_column() {
+fn what_no_field_can_hold_is_named_with_file_line_and_column() {
     for column in ["x", "y", "xVelocity", "yVelocity", "xAcceleration"] {
         for (value, says) in [
             ("abc", "`abc` is not a number"),
             ("", "empty"),
             ("NaN", "`NaN` is not finite"),
-            ("inf", "`inf` is not finite"),
             ("-Infinity", "not finite"),
             ("1e999", "not finite"),
             ("1e300", "out of range"),
-            ("1.2.3", "`1.2.3` is not a number"),
         ] {
             field("tracks", 5, column, value, &[says]);
         }
-        edited("tracks", |text| with_field(text, 5, column, "1,5"), &["line 5", "26 fields"]);
     }
-    for column in ["frame", "id", "laneId"] {
-        field("tracks", 5, column, "2.5", &["`2.5` is not a whole number"]);
+    // Lines 2 to 9 of the tracks are vehicle 1, frames 1 to 8.
+    for (name, line, column, values, says) in [
+        ("tracks", 5, "frame", "2.5", "`2.5` is not a whole number"),
+        ("tracks", 5, "frame", "3", "frame 3 of this vehicle occurs twice"),
+        ("tracks", 5, "frame", "0", "out of order"),
+        ("tracks", 2, "frame", "9e14", "out of range"),
+        ("tracksMeta", 3, "width", "-4.50 0.00 nan", ""),
+        ("tracksMeta", 3, "height", "-1.80 0", ""),
+        ("tracksMeta", 2, "id", "-1 4294967296 x", ""),
+        ("tracksMeta", 4, "drivingDirection", "0 3 -1 north", ""),
+        ("tracksMeta", 4, "class", "Tram", "`Car` or `Truck`"),
+        ("recordingMeta", 2, "frameRate", "0 0.00 -25 NaN inf fast 1e9 1e-9", ""),
+        ("recordingMeta", 2, "upperLaneMarkings", " ", "vehicle 1 drives in direction 1"),
+        ("recordingMeta", 2, "lowerLaneMarkings", " ", "vehicle 5 drives in direction 2"),
+        ("recordingMeta", 2, "upperLaneMarkings", "8.00;15.50;11.75;19.25", "11.75 comes after 15.5"),
+        ("recordingMeta", 2, "lowerLaneMarkings", "24.00;24.00;31.25", "do not ascend"),
+        ("recordingMeta", 2, "lowerLaneMarkings", "24.00;;31.25", "`` is not a finite number"),
+        ("recordingMeta", 2, "lowerLaneMarkings", "24.00", "1 lane line"),
+        ("recordingMeta", 2, "lowerLaneMarkings", "4.00;7.50;11.25", "above the last of the upper ones"),
+    ] {
+        let values = if says.is_empty() { values.split(' ').collect() } else { vec![values] };
+        values
+            .into_iter()
+            .for_each(|value| drop(field(name, line, column, value, &[if says.is_empty() { value } else { says }])));
+    }
+}
+
+#[test]
+fn tables_that_are_not_whole_are_refused_with_what_is_missing() {
+    let header = |table: &str| table.lines().next().unwrap().to_owned() + "\n";
+    let swapped = |text: &str| {
+        let mut lines: Vec<&str> = text.lines().collect();
+        lines.swap(4, 5);
+        lines.join("\n")
+    };
+    let neither = |text: &str| with_field(&with_field(text, 2, "upperLaneMarkings", ""), 2, "lowerLaneMarkings", "");
+    type Edit<'a> = &'a dyn Fn(&str) -> String;
+    let edits: [(&str, Edit, &[&str]); 18] = [
+        ("tracks", &|text| text.replacen("yAcceleration", "x", 1), &["line 1", "column `x`", "twice"]),
+        ("tracks", &|text| with_field(text, 5, "x", "1,5"), &["line 5", "26 fields"]),
+        ("tracks", &|text| without_line(text, 5), &["line 5", "column `frame`", "vehicle 1", "gap"]),
+        ("tracks", &|text| with_repeated_line(text, 4), &["line 28", "vehicle 1", "twice"]),
+        ("tracks", &swapped, &["line 5", "out of order"]),
+        ("tracksMeta", &|text| with_repeated_line(text, 2), &["line 6", "vehicle 1", "same id"]),
+        ("tracks", &header, &["vehicle 1", "has 0 frames", "3 more vehicles"]),
+        ("tracks", &|_| String::new(), &["empty", "header"]),
+        ("tracksMeta", &|_| "\r\n\r\n".to_owned(), &["empty"]),
+        ("recordingMeta", &|text| without_line(text, 2), &["no line after the header"]),
+        ("recordingMeta", &|text| with_repeated_line(text, 2), &["line 3", "second line"]),
+        ("recordingMeta", &neither, &["line 2", "lane lines are missing"]),
+        ("tracks", &|text| edit_line(text, 6, |line| line[..20].to_owned()), &["line 6", "expected 25"]),
+        ("tracks", &|text| edit_line(text, 6, |line| line.replacen(',', ",\"", 1)), &["line 6", "quotation mark"]),
+        ("tracksMeta", &|text| edit_line(text, 3, |line| format!("{line},")), &["line 3", "17 fields"]),
+        ("tracks", &|text| text.replace(',', ";"), &["line 1", "';'", "expected commas"]),
+        ("tracks", &|text| text.lines().take(22).collect::<Vec<_>>().join("\n"), &["vehicle 7", "truncated?"]),
+        ("tracks", &|text| text[..text.trim_end().rfind(',').unwrap() + 1].to_owned(), &["`laneId`", "empty"]),
+    ];
+    edits.into_iter().for_each(|(name, edit, says)| drop(edited(name, edit, says)));
+    // Wherever the last line is cut, except inside the very last number: nothing tells 12 from 1 there.
+    let whole = Texts::small().tracks;
+    let (last_line, last_field) =
+        [('\n', 1), (',', 0)].map(|(c, more)| whole.trim_end().rfind(c).unwrap() + more).into();
+    for cut in last_line..last_field {
+        edited("tracks", |text| text[..cut].to_owned(), &["truncated"]);
+    }
+    let lost = ["01_tracks.csv", "line 10", "column `id`", "vehicle 2 is not in the tracksMeta file"];
+    refused(|t| t.tracks_meta = without_line(&t.tracks_meta, 3), &lost);
+    // The last takes no memory.
+    for count in ["6", "999999999999999999"] {
+        let spoil = |t: &mut Texts| t.tracks_meta = with_field(&t.tracks_meta, 2, "numFrames", count);
+        refused(spoil, &["vehicle 1", "has 8 frames", &format!("claims {count}")]);
+    }
+    // Without numFrames, first and last frame say how many there must be.
+    let uncounted = |t: &Texts| (without_column(&t.tracks_meta, "numFrames"), without_line(&t.tracks, 27));
+    refused(|t| (t.tracks_meta, t.tracks) = uncounted(t), &["vehicle 7", "has 4 frames", "claims 5"]);
+}
+
+/// UTF-16, and Latin-1 in a number and in the class.
+#[test]
+fn another_encoding_is_recognised() {
+    let t = Texts::small();
+    let recording = t.recording_meta.as_bytes();
+    let wide: Vec<u8> = t.tracks.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let latin = |text: String| -> Vec<u8> { text.bytes().map(|b| if b == b'?' { 0xfc } else { b }).collect() };
+    let (y, class) = (latin(with_field(&t.tracks, 4, "y", "1?")), latin(with_field(&t.tracks_meta, 4, "class", "C?r")));
+    let [tracks, meta] = [t.tracks.as_bytes(), t.tracks_meta.as_bytes()];
+    for (files, says) in [
+        ([&wide[..], meta, recording], ["01_tracks.csv", "line 1", "UTF-8"]),
+        ([&y, meta, recording], ["01_tracks.csv", "line 4", "column `y`"]),
+        ([tracks, &class, recording], ["01_tracksMeta.csv", "column `class`", "UTF-8"]),
+    ] {
+        assert_says(&small::read_bytes(files).unwrap_err(), &says);
     }
 }
 
@@ -260,147 +322,6 @@ fn line_numbers_count_the_header_and_hold_with_windows_line_ends_and_blank_lines
     edited("tracks", |text| spoiled(text).replacen('\n', "\n\n\n", 1), &["line 7", "column `x`"]);
     edited("tracks", last, &["line 27", "column `x`"]);
     edited("tracks", |text| last(text).trim_end().to_owned(), &["line 27", "column `x`"]);
-}
-
-#[test]
-fn a_field_that_cannot_be_is_named_with_its_place() {
-    for (column, value) in
-        [("width", "-4.50"), ("width", "0.00"), ("height", "-1.80"), ("height", "0"), ("height", "nan")]
-    {
-        field("tracksMeta", 3, column, value, &[value]);
-    }
-    for id in ["-1", "4294967296", "x"] {
-        field("tracksMeta", 2, "id", id, &[id]);
-    }
-    for direction in ["0", "3", "-1", "north", ""] {
-        field("tracksMeta", 4, "drivingDirection", direction, &[direction]);
-    }
-    field("tracksMeta", 4, "class", "Tram", &["`Tram`", "`Car` or `Truck`"]);
-    for rate in ["0", "0.00", "-25", "NaN", "inf", "", "fast", "1e9", "1e-9"] {
-        field("recordingMeta", 2, "frameRate", rate, &[rate]);
-    }
-}
-
-#[test]
-fn duplicates_disorder_and_gaps_in_a_vehicles_frames_are_told_apart() {
-    // Lines 2 to 9 are vehicle 1, frames 1 to 8.
-    field("tracks", 5, "frame", "3", &["vehicle 1", "frame 3 of this vehicle occurs twice"]);
-    field("tracks", 5, "frame", "0", &["vehicle 1", "out of order"]);
-    field("tracks", 2, "frame", "9e14", &["out of range"]);
-    let place = ["column `frame`", "vehicle 1"];
-    let with = |more: [&'static str; 2]| [place.as_slice(), more.as_slice()].concat();
-    edited("tracks", |text| without_line(text, 5), &with(["line 5", "gap"]));
-    // Two vehicles under one id, one after the other.
-    edited("tracks", |text| with_repeated_line(text, 4), &with(["line 28", "twice"]));
-    let swapped = |text: &str| {
-        let mut lines: Vec<&str> = text.lines().collect();
-        lines.swap(4, 5);
-        lines.join("\n")
-    };
-    edited("tracks", swapped, &with(["line 5", "out of order"]));
-}
-
-#[test]
-fn the_vehicles_of_the_two_files_must_be_the_same() {
-    let lost = ["01_tracks.csv", "line 10", "column `id`", "vehicle 2 is not in the tracksMeta file"];
-    refused(|t| t.tracks_meta = without_line(&t.tracks_meta, 3), &lost);
-    let more = "9,4.00,1.80,1,12,12,Car,2,0.00,0.00,0.00,0.00,-1.00,-1.00,-1.00,0\n";
-    let announced = ["01_tracks.csv", "vehicle 9", "has 0 frames", "claims 12", "truncated?"];
-    refused(|t| t.tracks_meta += more, &announced);
-    edited("tracksMeta", |text| with_repeated_line(text, 2), &["line 6", "vehicle 1", "same id"]);
-    // Without numFrames, first and last frame say how many there must be; without these, at least one.
-    let uncounted = |t: &Texts| without_column(&t.tracks_meta, "numFrames");
-    let last_line_lost = |t: &Texts| without_line(&t.tracks, 27);
-    let fewer = ["vehicle 7", "has 4 frames", "claims 5"];
-    refused(|t| (t.tracks_meta, t.tracks) = (uncounted(t), last_line_lost(t)), &fewer);
-    let bare = |t: &Texts| without_column(&uncounted(t), "finalFrame") + "9,4,1.8,1,Car,2,0,0,0,0,-1,-1,-1,0\n";
-    refused(|t| t.tracks_meta = bare(t), &["vehicle 9", "has 0 frames", "in the tracksMeta file"]);
-    field("tracksMeta", 2, "numFrames", "-8", &["-8"]);
-    // The last takes no memory.
-    for (count, says) in [("6", "claims 6"), ("999999999999999999", "claims 999999999999999999")] {
-        let spoil = |t: &mut Texts| t.tracks_meta = with_field(&t.tracks_meta, 2, "numFrames", count);
-        refused(spoil, &["vehicle 1", "has 8 frames", says]);
-    }
-}
-
-#[test]
-fn a_recording_without_vehicles_or_lines_is_refused() {
-    let header = |table: &str| table.lines().next().unwrap().to_owned() + "\n";
-    let empty = |t: &mut Texts| (t.tracks, t.tracks_meta) = (header(&t.tracks), header(&t.tracks_meta));
-    refused(empty, &["01_tracksMeta.csv", "no vehicle"]);
-    edited("tracks", header, &["vehicle 1", "has 0 frames", "3 more vehicles"]);
-    let no_frames = |t: &mut Texts| {
-        t.tracks = header(&t.tracks);
-        (2..=5).for_each(|line| t.tracks_meta = with_field(&t.tracks_meta, line, "numFrames", "0"));
-    };
-    refused(no_frames, &["01_tracks.csv", "no vehicle"]);
-    edited("tracks", |_| String::new(), &["empty", "header"]);
-    edited("tracksMeta", |_| "\r\n\r\n".to_owned(), &["empty"]);
-    edited("recordingMeta", |_| String::new(), &["empty"]);
-    edited("recordingMeta", |text| without_line(text, 2), &["no line after the header"]);
-    edited("recordingMeta", |text| with_repeated_line(text, 2), &["line 3", "second line"]);
-}
-
-#[test]
-fn lane_lines_that_are_missing_disordered_or_no_numbers_are_refused() {
-    let upper = |cell: &str, says: &[&str]| field("recordingMeta", 2, "upperLaneMarkings", cell, says);
-    let lower = |cell: &str, says: &[&str]| field("recordingMeta", 2, "lowerLaneMarkings", cell, says);
-    upper("", &["missing", "vehicle 1 drives in direction 1"]);
-    lower(" ", &["missing", "vehicle 5 drives in direction 2"]);
-    upper("8.00;15.50;11.75;19.25", &["do not ascend", "11.75 comes after 15.5"]);
-    upper("19.25;15.50", &["do not ascend"]);
-    lower("24.00;24.00;31.25", &["do not ascend"]);
-    lower("24.00;x;31.25", &["`x` is not a finite number"]);
-    lower("24.00;;31.25", &["`` is not a finite number"]);
-    lower("24.00;NaN", &["`NaN` is not a finite number"]);
-    lower("24.00", &["1 lane line"]);
-    lower("4.00;7.50;11.25", &["above the last of the upper ones"]);
-    let neither = |text: &str| with_field(&with_field(text, 2, "upperLaneMarkings", ""), 2, "lowerLaneMarkings", "");
-    edited("recordingMeta", neither, &["line 2", "lane lines are missing"]);
-}
-
-#[test]
-fn a_file_that_ends_early_is_called_truncated() {
-    // Whatever the place of the cut, except inside the very last number: nothing tells 12 from 1 there.
-    let whole = Texts::small();
-    let last_line = whole.tracks.trim_end().rfind('\n').unwrap() + 1;
-    let last_field = whole.tracks.trim_end().rfind(',').unwrap() + 1;
-    for cut in last_line..last_field {
-        let error = edited("tracks", |text| text[..cut].to_owned(), &["truncated"]);
-        if cut > last_line {
-            assert_says(&error, &["line 27", "expected 25"]);
-        }
-    }
-    edited("tracks", |text| text[..last_field].to_owned(), &["line 27", "column `laneId`", "empty"]);
-    // Cut between two vehicles: no line is short, but vehicle 7 is announced.
-    refused(|t| t.tracks = t.tracks.lines().take(22).collect::<Vec<_>>().join("\n"), &["vehicle 7", "truncated?"]);
-}
-
-#[test]
-fn a_line_with_too_few_or_too_many_fields_is_named() {
-    let line_6 = |text: &str, edit: &dyn Fn(&str) -> String| edit_line(text, 6, edit);
-    edited("tracks", |text| line_6(text, &|line| format!("{line},7")), &["line 6", "26 fields; expected 25"]);
-    edited("tracks", |text| line_6(text, &|line| line[..20].to_owned()), &["line 6", "expected 25"]);
-    edited("tracks", |text| line_6(text, &|line| line.replacen(',', ",\"", 1)), &["line 6", "quotation mark"]);
-    edited("tracksMeta", |text| edit_line(text, 3, |line| format!("{line},")), &["line 3", "17 fields"]);
-}
-
-#[test]
-fn another_separator_and_another_encoding_are_recognised() {
-    let error = edited("tracks", |text| text.replace(',', ";"), &["line 1", "';'", "expected commas"]);
-    assert!(error.help().unwrap().contains("commas"));
-    let t = Texts::small();
-    let [meta, recording] = [t.tracks_meta.as_bytes(), t.recording_meta.as_bytes()];
-    let wide: Vec<u8> = t.tracks.encode_utf16().flat_map(u16::to_le_bytes).collect();
-    assert_says(&small::read_bytes([&wide, meta, recording]).unwrap_err(), &["01_tracks.csv", "line 1", "UTF-8"]);
-    // Latin-1 ü in a number, and in the class.
-    let latin = |text: String| -> Vec<u8> { text.bytes().map(|b| if b == b'?' { 0xfc } else { b }).collect() };
-    let error = small::read_bytes([&latin(with_field(&t.tracks, 4, "y", "1?")), meta, recording]).unwrap_err();
-    assert_says(&error, &["01_tracks.csv", "line 4", "column `y`", "is not a number"]);
-    assert!(error.help().unwrap().contains("UTF-8"));
-    let class = latin(with_field(&t.tracks_meta, 4, "class", "C?r"));
-    let error = small::read_bytes([t.tracks.as_bytes(), &class, recording]).unwrap_err();
-    assert_says(&error, &["01_tracksMeta.csv", "line 4", "column `class`", "UTF-8"]);
 }
 
 /// One damage to a file: what to do, where (as a part of the length), with what.

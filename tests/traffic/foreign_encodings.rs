@@ -10,7 +10,7 @@ use lanesweep::traffic::trajectory::tracks::{self, Preset, TrackFile};
 use lanesweep::traffic::trajectory::{InputFile, Inputs, Recording};
 
 use crate::common::exid::Plain;
-use crate::tracks::generated;
+use crate::traffic::tracks::generated;
 
 fn table() -> Plain {
     Plain::of(&generated(), 5)
@@ -143,7 +143,7 @@ fn what_a_time_without_a_unit_is_taken_for_is_said() {
     let generic = Preset::load("generic").unwrap();
     let read = tracks::read_tracks(&TrackFile { path, id: "own".to_owned() }, &generic).unwrap();
     let about = &read[0].understanding;
-    assert!(crate::tracks::fact(about, "columns").contains("time = t (ms since 1970)"), "{:?}", about.facts);
+    assert!(crate::traffic::tracks::fact(about, "columns").contains("time = t (ms since 1970)"), "{:?}", about.facts);
 }
 
 #[test]
@@ -154,32 +154,6 @@ fn times_of_day_that_pass_midnight_are_refused() {
     };
     let error = read("own.csv", with_times(evening).text().as_bytes()).unwrap_err().to_string();
     assert!(error.contains("midnight") && error.contains("line "), "{error}");
-}
-
-#[test]
-fn positions_in_millimetres_are_read_by_a_preset() {
-    let dir = tempfile::tempdir().unwrap();
-    let (path, preset) = (dir.path().join("own.csv"), dir.path().join("own.toml"));
-    let mut in_mm = table();
-    for (column, name) in [("x", "x_mm"), ("y", "y_mm")] {
-        in_mm.map(column, |metres, _| 1000.0 * metres);
-        let at = in_mm.at(column);
-        in_mm.header[at] = name.to_owned();
-    }
-    fs::write(&path, in_mm.text()).unwrap();
-    let sizes = "length = \"length\"\nwidth = \"width\"\nclass = \"class\"\nheading = \"heading\"\nx_speed = \"vx\"\ny_speed = \"vy\"";
-    let columns = "x = { name = \"x_mm\", unit = \"mm\" }\ny = { name = \"y_mm\", unit = \"mm\" }";
-    let own = format!(
-        "name = \"own\"\n[classes]\ntruck = [\"truck\"]\n[columns]\nvehicle = \"track_id\"\ntime = \"t\"\n{columns}\n{sizes}\n"
-    );
-    fs::write(&preset, own).unwrap();
-    let preset = Preset::load(&preset.to_string_lossy()).unwrap();
-    let found = InputFile::Tracks(TrackFile { path, id: "own".to_owned() }, Box::new(preset))
-        .read(Implausible::Refused)
-        .unwrap();
-    let right = read("own.csv", table().text().as_bytes()).unwrap();
-    let pairs = found[0].recording.tracks.iter().zip(&right.tracks);
-    assert!(pairs.flat_map(|(a, b)| a.s_m.iter().zip(&b.s_m)).all(|(a, b)| (a - b).abs() < 1e-9));
 }
 
 #[test]
@@ -208,15 +182,15 @@ fn geographic_coordinates_are_named_as_such() {
 /// Without a preset that names another unit; every codec of the usual programs.
 #[cfg(feature = "parquet")]
 #[test]
-fn parquet_with_gzip_or_lz4_and_instants_is_the_table() {
+fn parquet_with_gzip_or_lz4_and_microseconds_is_the_table_and_instants_are_refused() {
     use std::sync::Arc;
 
-    use arrow_array::{ArrayRef, Float64Array, StringArray, TimestampMicrosecondArray};
+    use arrow_array::{ArrayRef, Float64Array, Int64Array, StringArray, TimestampMicrosecondArray};
     use parquet::basic::{Compression, GzipLevel};
 
     let table = table();
     let right = from_frame_0(read("own.csv", table.text().as_bytes()).unwrap());
-    let column = |name: &String| -> ArrayRef {
+    let column = |name: &String, are_instants: bool| -> ArrayRef {
         let at = table.at(name);
         let texts = || table.rows.iter().map(move |row| row[at].as_str());
         let numbers = || texts().map(|text| text.parse::<f64>().unwrap());
@@ -224,7 +198,10 @@ fn parquet_with_gzip_or_lz4_and_instants_is_the_table() {
             "class" | "track_id" => Arc::new(StringArray::from_iter_values(texts())),
             "t" => {
                 let instants = numbers().map(|t| 1_740_823_200_000_000 + (1e6 * t).round() as i64);
-                Arc::new(TimestampMicrosecondArray::from_iter_values(instants))
+                match are_instants {
+                    true => Arc::new(TimestampMicrosecondArray::from_iter_values(instants)),
+                    false => Arc::new(Int64Array::from_iter_values(instants)),
+                }
             }
             _ => Arc::new(Float64Array::from_iter_values(numbers())),
         }
@@ -233,8 +210,12 @@ fn parquet_with_gzip_or_lz4_and_instants_is_the_table() {
     let path = dir.path().join("own.parquet");
     let gzip = Compression::GZIP(GzipLevel::default());
     for codec in [gzip, Compression::LZ4, Compression::LZ4_RAW, Compression::SNAPPY] {
-        let columns = table.header.iter().map(|name| (name.as_str(), column(name))).collect();
+        let columns = table.header.iter().map(|name| (name.as_str(), column(name, false))).collect();
         crate::common::tables::made::write(&path, columns, codec);
         assert!(from_frame_0(read("own.parquet", &fs::read(&path).unwrap()).unwrap()) == right, "{codec:?}");
     }
+    let columns = table.header.iter().map(|name| (name.as_str(), column(name, true))).collect();
+    crate::common::tables::made::write(&path, columns, gzip);
+    let error = read("own.parquet", &fs::read(&path).unwrap()).unwrap_err();
+    assert!(error.help().unwrap().contains("pl.col(\"t\").cast(pl.Int64) in Polars"), "{error:?}");
 }

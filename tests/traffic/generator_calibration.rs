@@ -1,6 +1,6 @@
 //! The synthetic recordings beside the published figures they are calibrated to.
 //!
-//! Run `cargo test --release --test traffic generator_calibration:: -- --nocapture` to see the tables: figure,
+//! Run `cargo test --release --test library generator_calibration:: -- --nocapture` to see the tables: figure,
 //! published, ours, and the span outside of which the test fails.
 
 mod traffic;

@@ -296,15 +296,6 @@ proptest! {
     }
 
     #[test]
-    fn longitudinal_events_ascend_and_alternate(steps in prop::collection::vec(-6..=6i32, 1..40), stretch in 1..30usize) {
-        let v = walk(&steps, stretch);
-        let events = longitudinal_events(&v, 25.0, &LongitudinalOptions::default());
-        prop_assert_eq!(events[0].start, 0);
-        prop_assert!(events.windows(2).all(|e| e[0].start < e[1].start && e[0].activity != e[1].activity));
-        prop_assert!(events.iter().all(|e| e.start < v.len()));
-    }
-
-    #[test]
     fn lane_changes_hold_their_crossing_and_do_not_overlap(
         steps in prop::collection::vec(-8..=8i32, 1..40),
         stretch in 1..30usize,

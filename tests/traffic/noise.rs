@@ -1,12 +1,9 @@
 //! Noise decides nothing in silence: rounded positions, rounded speeds and one speed per vehicle are said, and good tracks are not doubted.
 
-use std::fs;
-
-use lanesweep::model::plausibility::Implausible;
 use lanesweep::scenario::Category;
-use lanesweep::traffic::mining::{MiningOptions, count, mine, mine_inputs, noise_notes};
+use lanesweep::traffic::mining::{MiningOptions, count, mine, noise_notes};
+use lanesweep::traffic::trajectory::Recording;
 use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
-use lanesweep::traffic::trajectory::{Inputs, Recording};
 
 use crate::common::exid::Plain;
 
@@ -34,7 +31,7 @@ fn rounded(mut table: Plain, columns: &[&str], step: f64) -> Plain {
 
 /// Kept leader decelerations of a table, and the notes on noise.
 fn mined(table: &Plain, smoothing_s: Option<f64>) -> (u64, Vec<String>) {
-    let read = crate::tracks::read(table, &|preset| preset.smoothing_s = smoothing_s).unwrap();
+    let read = crate::traffic::tracks::read(table, &|preset| preset.smoothing_s = smoothing_s).unwrap();
     let graves: Vec<_> = read.understanding.findings.iter().filter(|finding| finding.is_grave).collect();
     assert!(graves.is_empty(), "{graves:?}");
     let options = MiningOptions::default();
@@ -88,16 +85,6 @@ fn rounded_values_that_decide_are_said_and_smoothing_repairs_them() {
 }
 
 #[test]
-fn runs_carry_the_note_of_noise() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("own.csv");
-    fs::write(&path, rounded(without_speeds(f64::INFINITY), &["x", "y"], 0.01).text()).unwrap();
-    let inputs = Inputs::of(&path, None).unwrap();
-    let notes = mine_inputs(inputs, &MiningOptions::default(), Implausible::Refused, || Ok(())).unwrap().notes;
-    assert!(notes.iter().any(|note| note.starts_with("recording own: noise can decide")), "{notes:?}");
-}
-
-#[test]
 fn one_speed_per_vehicle_is_refused() {
     let mut recording = recording();
     for track in &mut recording.tracks {
@@ -106,6 +93,6 @@ fn one_speed_per_vehicle_is_refused() {
         track.v_d_mps.fill(0.0);
     }
     let table = Plain::of(&recording, 5).without(&["heading", "vx", "vy"]);
-    let found = crate::tracks::understood(&table, &|_| ()).unwrap().findings;
+    let found = crate::traffic::tracks::understood(&table, &|_| ()).unwrap().findings;
     assert!(found.iter().any(|of| of.is_grave && of.text.contains("one speed per vehicle")), "{found:?}");
 }

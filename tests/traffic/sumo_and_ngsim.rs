@@ -9,7 +9,7 @@ use lanesweep::scenario::{Category, read_scenario_file, write_scenarios};
 use lanesweep::traffic::mining::{Collection, MiningOptions, mine_folder, mine_inputs};
 use lanesweep::traffic::trajectory::{Inputs, Track, VehicleClass};
 
-use crate::tracks::load;
+use crate::traffic::tracks::load;
 
 const LANE_WIDTH_M: f64 = 3.5;
 const RATE_HZ: f64 = 10.0;

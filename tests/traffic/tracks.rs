@@ -408,16 +408,6 @@ generic|x.csv|track_id,t,x,y,class
     assert!(error.to_string().contains("`Fahrzeug`") && error.help().unwrap().contains("`generic`"), "{error}");
 }
 
-#[test]
-fn every_shipped_preset_is_valid() {
-    let names: Vec<&str> = Preset::names().collect();
-    assert_eq!(names.len(), 12, "{names:?}");
-    for name in names.into_iter().filter(|name| *name != tracks::HIGHD) {
-        assert_eq!(Preset::load(name).unwrap().name, name);
-    }
-    assert!(Preset::load("sumo").unwrap_err().to_string().contains("sumo-fcd"));
-}
-
 /// A mistake in SI units: role, value, sample → value.
 type Mistake<'a> = &'a dyn Fn(Role, f64, &Track) -> f64;
 

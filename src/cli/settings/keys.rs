@@ -6,7 +6,6 @@ use serde_json::{Number, Value};
 use toml::de::DeValue;
 
 use super::schema::settings_schema;
-use crate::arguments::Value as Given;
 use lanesweep_support::plain_text;
 use lanesweep_support::ranges::Range;
 use lanesweep_support::{Error, Place, Result};
@@ -163,22 +162,6 @@ pub(super) fn from_word(key: &Key, word: &str, place: Place) -> Result<Value> {
     value.and_then(|value| fitted(key, value)).ok_or_else(|| refused(key, &format!("`{word}`"), place))
 }
 
-/// Converts an argument's value to a value of a key.
-///
-/// # Errors
-/// As [`from_toml`].
-pub(super) fn from_value(key: &Key, given: &Given, place: Place) -> Result<Value> {
-    let value = match (&key.kind, given) {
-        (_, Given::Boolean(is_so)) => Some(Value::Bool(*is_so)),
-        // A number is a name too: the device 0.
-        (KeyKind::Text, _) => given.text().ok().map(Value::String),
-        (_, Given::Whole(n)) => whole(*n),
-        (_, Given::Number(x)) => Number::from_f64(*x).map(Value::Number),
-        _ => None,
-    };
-    value.and_then(|value| fitted(key, value)).ok_or_else(|| refused(key, &format!("`{given}`"), place))
-}
-
 /// Formats a value as TOML.
 pub(crate) fn text_of(value: &Value) -> String {
     match value {
@@ -256,53 +239,4 @@ fn names(text: &str) -> Vec<String> {
         }
     }
     names
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::{KeyKind, Layers, Settings, file};
-    use super::*;
-    use lanesweep_support::Place;
-    use lanesweep_support::ranges::Range;
-
-    #[test]
-    fn the_file_that_ships_is_the_defaults_and_names_every_key_once() {
-        let keys = Key::all();
-        let lines = file::parse(DEFAULT_FILE, &Place::item("default"), &keys).unwrap();
-        for key in &keys {
-            let value = lines.iter().find(|line| line.key == key.name).map(|line| line.value.clone());
-            assert_eq!(value, key.default, "{}", key.name);
-        }
-        let mut found = names(DEFAULT_FILE);
-        found.sort();
-        let mut wanted: Vec<String> = keys.into_iter().map(|key| key.name).collect();
-        wanted.sort();
-        assert_eq!(found, wanted);
-        assert_eq!(Layers::defaults().settings().unwrap(), Settings::default());
-        assert_eq!(toml::from_str::<Settings>(DEFAULT_FILE).unwrap(), Settings::default());
-    }
-
-    #[test]
-    fn every_key_is_explained() {
-        let keys = Key::all();
-        assert!(keys.iter().all(|key| key.description.len() > 8), "{keys:?}");
-    }
-
-    #[test]
-    fn what_the_schema_lets_pass_at_its_bounds_the_types_take_too() {
-        for key in Key::all() {
-            let KeyKind::Number(Range { min, max, .. }) = key.kind else { continue };
-            let closed = [min, max].into_iter().flatten().filter(|(_, open)| !open);
-            for (bound, _) in closed {
-                let mut layers = Layers::defaults();
-                layers.assign(&format!("{}={bound}", key.name)).unwrap();
-                layers.settings().unwrap();
-            }
-            let beyond = [min.map(|(x, _)| x - 1.0), max.map(|(x, _)| x + 1.0)];
-            for bound in beyond.into_iter().flatten() {
-                let error = Layers::defaults().assign(&format!("{}={bound}", key.name)).unwrap_err();
-                assert!(error.to_string().contains("expected"), "{error}");
-            }
-        }
-    }
 }

@@ -41,25 +41,25 @@ impl CountLayout {
     }
 
     /// Σ over samples of (failed headways)²: model × criterion.
-    pub fn squares(&self) -> Range<usize> {
+    pub(crate) fn squares(&self) -> Range<usize> {
         let from = self.failures().end;
         from..from + self.models * Criterion::ALL.len()
     }
 
     /// Lanes that ended at the time cap: headway × model.
-    pub fn capped(&self) -> Range<usize> {
+    pub(crate) fn capped(&self) -> Range<usize> {
         let from = self.squares().end;
         from..from + self.lanes()
     }
 
     /// Samples by group of kernels.
-    pub fn kernel_samples(&self) -> Range<usize> {
+    pub(crate) fn kernel_samples(&self) -> Range<usize> {
         let from = self.capped().end;
         from..from + self.groups
     }
 
     /// Failed lanes: headway × model × criterion × group.
-    pub fn kernel_failures(&self) -> Range<usize> {
+    pub(crate) fn kernel_failures(&self) -> Range<usize> {
         let from = self.kernel_samples().end;
         from..from + self.lanes() * Criterion::ALL.len() * self.groups
     }

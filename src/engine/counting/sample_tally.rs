@@ -12,7 +12,7 @@ use crate::generated::{ATTEMPTS, DrawnPoint, Generator};
 use crate::outcome::Verdicts;
 use crate::plan::LanePlan;
 use lanesweep_model::criterion::Criterion;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Number of samples of one task.
 const TASK: usize = 4096;
@@ -69,9 +69,10 @@ impl SampleTally {
             return Ok(());
         }
         Err(Error::Verification(format!(
-            "{backend} counted samples {} to {} otherwise than the CPU counts their verdicts; use option `backend = cpu`",
+            "{backend} counted samples {} to {} otherwise than the CPU counts their verdicts; use {}",
             chunk.units.start,
-            chunk.units.end - 1
+            chunk.units.end - 1,
+            option("backend = cpu")
         )))
     }
 

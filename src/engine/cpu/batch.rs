@@ -16,8 +16,7 @@ use crate::cpu::{LANES, ROWS};
 use crate::frame::Simulation;
 use crate::lane_step::{LaneConstants, LaneState, OtherState, advance};
 use lanesweep_model::driver::DriverModel;
-use lanesweep_model::scalar::Flag;
-use lanesweep_model::scalar::Real;
+use lanesweep_model::scalar::{Flag, Real};
 
 /// Batches of a burst.
 pub(crate) const BATCHES: usize = 3;
@@ -240,7 +239,7 @@ pub(crate) fn burst<M: DriverModel<f32>, const RULES: u32>(
     take: impl Fn(&mut [[u32; LANES]], &[[u32; ROOM]], usize, Slots),
     turn: impl Fn(&mut Window, &TrackArrays<LANES>, &Words, &[f32]),
 ) {
-    let rules = const { Rules::from_bits(RULES) };
+    let rules = const { Rules::ALL[RULES as usize] };
     let (frame, criteria) = rules.applied(simulation.frame, simulation.criteria);
     let model = *simulation.model;
     let simulation =

@@ -576,7 +576,7 @@ mod tests {
         assert!(pending.parts(false, false, false).into_iter().flatten().all(|row| row[31] != 0), "{pending:?}");
 
         let mut after: StateArrays<LANES> = LaneArrays::idle().state;
-        let everything = Rules::from_bits(1);
+        let everything = Rules::ALL[1];
         after.set::<Fsm<f32>>(3, &state, everything);
         assert_eq!(after.at(3), state);
     }

@@ -20,16 +20,32 @@ pub(crate) struct Rules {
     pub keeps_measures: bool,
 }
 
-impl Rules {
-    /// Number of sets.
-    pub(crate) const SETS: u32 = 22;
+const ALONE: Scene = Scene { in_lane: false, ..Scene::in_lane() };
+const PAIR: Scene = Scene { is_pair: true, always_there: false, ..ALONE };
+const STEADY: Scene = Scene { is_steady: true, ..Scene::in_lane() };
+const ALONE_CROSSING: Scene = Scene { may_cross: true, ..ALONE };
+const CROSSING: Scene = Scene { may_cross: true, ..PAIR };
 
-    const VERDICT_ONLY: u32 = 4;
-    const SELDOM: u32 = 8;
-    const IN_LANE: u32 = 12;
-    const STEADY_FOLLOWING: u32 = 13;
-    const CROSSING: u32 = 14;
-    const SELDOM_VALUES: u32 = 18;
+const fn usual(scene: Scene, sees_overlap: bool, is_verdict_only: bool) -> Rules {
+    let (is_ratio, is_seldom, keeps_measures) = (false, false, !is_verdict_only);
+    Rules { scene, is_ratio, sees_overlap, is_seldom, is_verdict_only, keeps_measures }
+}
+
+const fn seldom(scene: Scene, is_ratio: bool, keeps_measures: bool) -> Rules {
+    Rules { scene, is_ratio, sees_overlap: false, is_seldom: true, is_verdict_only: false, keeps_measures }
+}
+
+impl Rules {
+    /// Every set. Lateral motion in the lane is not evaluated, so there is no gate.
+    #[rustfmt::skip] // a table
+    pub(crate) const ALL: [Rules; 22] = [
+        usual(ALONE, false, false), usual(PAIR, false, false), usual(ALONE, true, false), usual(PAIR, true, false),
+        usual(ALONE, false, true), usual(PAIR, false, true), usual(ALONE, true, true), usual(PAIR, true, true),
+        usual(CROSSING, false, false), usual(CROSSING, true, false), usual(CROSSING, false, true), usual(CROSSING, true, true),
+        usual(Scene::in_lane(), false, true), usual(STEADY, false, true),
+        seldom(ALONE_CROSSING, false, false), seldom(CROSSING, false, false), seldom(ALONE_CROSSING, true, false), seldom(CROSSING, true, false),
+        seldom(ALONE_CROSSING, false, true), seldom(CROSSING, false, true), seldom(ALONE_CROSSING, true, true), seldom(CROSSING, true, true),
+    ];
 
     /// Rules of a simulation; `None` for the exact form of the BTN, which iterates and runs lane by lane.
     /// `values`: the sweep returns values, not only verdicts.
@@ -39,71 +55,21 @@ impl Rules {
             BtnForm::DistanceRatio => true,
             BtnForm::Exact => return None,
         };
-        let is_seldom = is_ratio || frame.abort_above_ttc > 0.0 || frame.largest_demand;
-        let sees_overlap = criteria.gate == LateralGate::Overlap && !is_seldom;
-        let is_verdict_only = !values && !is_seldom;
         // Rarely used rules always test for contacts between two steps.
-        let may_cross = scene.may_cross || is_seldom;
-        let scene = Scene { in_lane: scene.in_lane && is_verdict_only, may_cross, ..scene };
-        Some(Rules { scene, is_ratio, sees_overlap, is_seldom, is_verdict_only, keeps_measures: values })
+        if is_ratio || frame.abort_above_ttc > 0.0 || frame.largest_demand {
+            return Some(seldom(if scene.is_pair { CROSSING } else { ALONE_CROSSING }, is_ratio, values));
+        }
+        let sees_overlap = criteria.gate == LateralGate::Overlap;
+        Some(match scene {
+            Scene { in_lane: true, .. } if !values => usual(Scene::in_lane(), false, true),
+            Scene { may_cross: true, .. } => usual(CROSSING, sees_overlap, !values),
+            Scene { is_pair, .. } => usual(if is_pair { PAIR } else { ALONE }, sees_overlap, !values),
+        })
     }
 
     /// Rules of steady-following steps with a single vehicle, for verdicts only.
     pub(crate) fn is_steady() -> Rules {
-        Rules::from_bits(Rules::STEADY_FOLLOWING)
-    }
-
-    /// Encoded as a number below [`Rules::SETS`].
-    pub(crate) const fn bits(self) -> u32 {
-        if self.scene.is_steady {
-            return Rules::STEADY_FOLLOWING;
-        }
-        if self.scene.in_lane {
-            // Lateral motion is not evaluated, so there is no gate.
-            return Rules::IN_LANE;
-        }
-        if self.is_seldom {
-            let first = if self.keeps_measures { Rules::SELDOM_VALUES } else { Rules::SELDOM };
-            return first + (self.scene.is_pair as u32 | (self.is_ratio as u32) << 1);
-        }
-        if self.scene.may_cross {
-            return Rules::CROSSING + (self.sees_overlap as u32 | (self.is_verdict_only as u32) << 1);
-        }
-        let first = if self.is_verdict_only { Rules::VERDICT_ONLY } else { 0 };
-        first + (self.scene.is_pair as u32 | (self.sees_overlap as u32) << 1)
-    }
-
-    /// Inverse of [`Rules::bits`].
-    pub(crate) const fn from_bits(bits: u32) -> Rules {
-        let is_pair = bits & 1 != 0;
-        let scene = Scene { is_pair, always_there: !is_pair, in_lane: false, is_steady: false, may_cross: false };
-        let common = Rules {
-            scene,
-            is_ratio: false,
-            sees_overlap: false,
-            is_seldom: false,
-            is_verdict_only: false,
-            keeps_measures: true,
-        };
-        let keeps_measures = bits >= Rules::SELDOM_VALUES;
-        let seldom = bits.wrapping_sub(if keeps_measures { Rules::SELDOM_VALUES } else { Rules::SELDOM });
-        if seldom < 4 {
-            let scene = Scene { may_cross: true, ..scene };
-            return Rules { scene, is_ratio: seldom & 2 != 0, is_seldom: true, keeps_measures, ..common };
-        }
-        if bits >= Rules::CROSSING {
-            let scene = Scene { is_pair: true, always_there: false, may_cross: true, ..scene };
-            let (sees_overlap, is_verdict_only) =
-                ((bits - Rules::CROSSING) & 1 != 0, (bits - Rules::CROSSING) & 2 != 0);
-            return Rules { scene, sees_overlap, is_verdict_only, keeps_measures: !is_verdict_only, ..common };
-        }
-        if bits >= Rules::IN_LANE {
-            // Lateral motion is not evaluated, so there is no gate.
-            let scene = Scene { is_steady: bits == Rules::STEADY_FOLLOWING, ..Scene::in_lane() };
-            return Rules { scene, is_verdict_only: true, keeps_measures: false, ..common };
-        }
-        let is_verdict_only = bits >= Rules::VERDICT_ONLY;
-        Rules { sees_overlap: bits & 2 != 0, is_verdict_only, keeps_measures: !is_verdict_only, ..common }
+        usual(STEADY, false, true)
     }
 
     /// The constants of the simulation; those that the rules fix become compile-time constants.
@@ -125,11 +91,28 @@ impl Rules {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Constants;
+    use lanesweep_model::profile::Profile;
+    use lanesweep_model::scenario::Category;
 
     #[test]
-    fn every_number_of_a_set_comes_back_from_its_rules() {
-        for bits in 0..Rules::SETS {
-            assert_eq!(Rules::from_bits(bits).bits(), bits);
+    fn every_simulation_has_a_set_and_no_set_is_there_twice() {
+        let constants = Constants::<f32>::resolve(&Profile::load("paper").unwrap(), Category::CutIn);
+        let scenes =
+            [ALONE, PAIR, Scene::in_lane(), ALONE_CROSSING, CROSSING, Scene::unknown(false), Scene::unknown(true)];
+        let mut found = vec![Rules::is_steady()];
+        for scene in scenes {
+            for (gate, abort_above_ttc) in
+                [(LateralGate::Overlap, 0.0), (LateralGate::EgoWidth, 0.0), (LateralGate::EgoWidth, 9.0)]
+            {
+                let frame = Frame { abort_above_ttc, ..constants.frames[0] };
+                let criteria = Criteria { gate, ..constants.criteria };
+                found.extend([false, true].map(|values| Rules::of(&frame, &criteria, scene, values).unwrap()));
+            }
         }
+        assert!(found.iter().all(|rules| Rules::ALL.contains(rules)));
+        // All but those of the distance ratio.
+        assert!(Rules::ALL.iter().all(|rules| rules.is_ratio || found.contains(rules)));
+        assert!((0..Rules::ALL.len()).all(|at| !Rules::ALL[..at].contains(&Rules::ALL[at])));
     }
 }

@@ -42,30 +42,12 @@ impl<M> Burst<M> {
 /// The function of a set of rules: one instance per set.
 macro_rules! for_rules {
     ($burst:ident, $model:ty, $rules:expr) => {
-        match $rules.bits() {
-            0 => $burst::<$model, 0>,
-            1 => $burst::<$model, 1>,
-            2 => $burst::<$model, 2>,
-            3 => $burst::<$model, 3>,
-            4 => $burst::<$model, 4>,
-            5 => $burst::<$model, 5>,
-            6 => $burst::<$model, 6>,
-            7 => $burst::<$model, 7>,
-            8 => $burst::<$model, 8>,
-            9 => $burst::<$model, 9>,
-            10 => $burst::<$model, 10>,
-            11 => $burst::<$model, 11>,
-            12 => $burst::<$model, 12>,
-            13 => $burst::<$model, 13>,
-            14 => $burst::<$model, 14>,
-            15 => $burst::<$model, 15>,
-            16 => $burst::<$model, 16>,
-            17 => $burst::<$model, 17>,
-            18 => $burst::<$model, 18>,
-            19 => $burst::<$model, 19>,
-            20 => $burst::<$model, 20>,
-            21 => $burst::<$model, 21>,
-            Rules::SETS.. => return None,
+        for_rules!($burst, $model, $rules, 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21)
+    };
+    ($burst:ident, $model:ty, $rules:expr, $($set:literal)*) => {
+        match Rules::ALL.iter().position(|set| *set == $rules)? {
+            $($set => $burst::<$model, $set>,)*
+            _ => return None,
         }
     };
 }

@@ -17,7 +17,6 @@ use lanesweep_model::scenario::Tables;
 use lanesweep_model::scenario::parameterization::Variable;
 
 use super::lane_case::LaneCase;
-use super::plan::CaseSource;
 use super::scene::{DeviceScene, MotionKind, stays_behind};
 
 /// A case generator: where points come from and what they mean.
@@ -177,21 +176,5 @@ impl Generator {
         ];
         all.extend(names.into_iter().zip(recipe.slots.map(f64::from)));
         all
-    }
-}
-
-impl CaseSource for Generator {
-    fn case(&self, _block: usize, unit: u64, _variant: usize) -> LaneCase<f64> {
-        // Only for callers that need no series: the tables are discarded.
-        Generator::case(self, unit, &mut Tables::default())
-    }
-
-    fn tables(&self) -> &Tables<f64> {
-        static NONE: Tables<f64> = Tables { speed: Vec::new(), lateral: Vec::new() };
-        &NONE
-    }
-
-    fn generator(&self) -> Option<&Generator> {
-        Some(self)
     }
 }

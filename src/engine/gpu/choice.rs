@@ -4,7 +4,7 @@
 
 use super::adapters::{AdapterCard, DeviceKind};
 use crate::device_choice::{BackendChoice, DeviceName};
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// The index of the device to use, or `None` for the CPU.
 ///
@@ -83,13 +83,13 @@ fn list<'a>(cards: impl Iterator<Item = &'a AdapterCard>) -> String {
 
 fn no_gpu(cards: &[AdapterCard]) -> Error {
     let named = match cards.first() {
-        Some(card) => format!(", or name a device: option `device = {}`", card.index),
+        Some(card) => format!(", or name a device: {}", option(&format!("device = {}", card.index))),
         None => String::new(),
     };
     Error::device(
-        "option `backend = gpu`",
+        option("backend = gpu"),
         "the drivers of this machine show no GPU",
-        format!("`lanesweep devices` lists all devices; use option `backend = cpu`{named}"),
+        format!("`lanesweep devices` lists all devices; use {}{named}", option("backend = cpu")),
     )
 }
 

@@ -14,7 +14,7 @@ use super::pacing::{Sharing, Tuner};
 use super::shader::{self, BURST, COUNT, ENTRY, GENERATE, WORKGROUP};
 use super::spirv::exact_spirv;
 use lanesweep_model::driver::ModelId;
-use lanesweep_support::{Error, Result};
+use lanesweep_support::{Error, Result, option};
 
 /// Options of a device.
 #[derive(Debug, Clone)]
@@ -124,7 +124,7 @@ impl Device {
             Error::device(
                 &card.name,
                 format!("it cannot be opened: {e}"),
-                "choose another device, or option `backend = cpu`",
+                format!("choose another device, or {}", option("backend = cpu")),
             )
         })?;
         // Without these handlers a device error would panic.
@@ -311,7 +311,11 @@ impl Device {
         let max_bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         if bytes.len() as u64 > max_bytes {
             let problem = format!("the {label} take {} bytes, but the device holds at most {max_bytes}", bytes.len());
-            return Err(Error::device(&self.name, problem, "use option `backend = cpu`, or split the data"));
+            return Err(Error::device(
+                &self.name,
+                problem,
+                format!("use {}, or split the data", option("backend = cpu")),
+            ));
         }
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
         let buffer = self.buffer(label, bytes.len() as u64, usage);
@@ -368,7 +372,7 @@ impl Device {
 
     /// The error of this device.
     pub(super) fn failed(&self, what: impl Into<String>) -> Error {
-        Error::device(&self.name, what, "the CPU backend computes the same: option `backend = cpu`")
+        Error::device(&self.name, what, format!("the CPU backend computes the same: {}", option("backend = cpu")))
     }
 }
 

@@ -8,12 +8,11 @@ use std::time::Instant;
 
 use super::adapters::AdapterCard;
 use super::device::{Device, GpuOptions, PipelineSpec, Tampering};
-use super::generator::Inputs;
-use super::generator::{GeneratorSetup, generate};
+use super::generator::{GeneratorSetup, Inputs, generate};
 use super::records::StartRecord;
 use super::ring::{Answer, Flight, Job, RING, Slot};
 use crate::LaneCase;
-use lanesweep_support::{Error, Result};
+use lanesweep_support::{Error, Result, option};
 
 /// Requirements of a session on the device.
 pub(super) struct Setup {
@@ -104,7 +103,11 @@ pub(super) fn start(
 
 /// The error of a thread that ended.
 pub(super) fn gone(device: &str) -> Error {
-    Error::device(device, "it is closed, or its driver failed and ended its thread", "use option `backend = cpu`")
+    Error::device(
+        device,
+        "it is closed, or its driver failed and ended its thread",
+        format!("use {}", option("backend = cpu")),
+    )
 }
 
 struct DeviceOwner {

@@ -10,7 +10,7 @@ use super::generator::Inputs;
 use super::pacing::Sharing;
 use super::records::{Launch, OutcomeRecord, Tally};
 use super::shader::{LONGEST_BURST, WORKGROUP};
-use lanesweep_support::{Error, Result};
+use lanesweep_support::{Error, Result, option};
 
 /// Maximum number of jobs in flight.
 pub(super) const RING: usize = 3;
@@ -377,8 +377,11 @@ fn read(device: &Device, flight: &Flight, bytes: &[u8], wall_s: f64) -> Result<A
     if let Some(at) = (0..finished.len()).find(|&at| finished[at] != expected(at)) {
         let (name, lanes) = (job.dispatches[at].pipeline.model.name(), expected(at));
         let problem = format!("it completed {} of {lanes} lanes of {name}", finished[at]);
-        let help =
-            "use option `backend = cpu`; if lanes have very many steps, a larger time step (option `dt`) may help";
+        let help = format!(
+            "use {}; if lanes have very many steps, a larger time step ({}) may help",
+            option("backend = cpu"),
+            option("dt")
+        );
         return Err(Error::device(&device.name, problem, help));
     }
     fn per_model(part: &[u8], models: usize, model: usize) -> &[u8] {

@@ -25,7 +25,7 @@ use crate::{
 };
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::scenario::Tables;
-use lanesweep_support::{Error, Result};
+use lanesweep_support::{Error, Result, option};
 
 /// Jobs per chunk, so that the ring stays full: about three seconds with four models. Before the first measurement a
 /// chunk is one job.
@@ -140,7 +140,11 @@ impl<'p> GpuSession<'p> {
         if per_unit > max_lanes || variants > self.prepared.max_cases {
             let problem =
                 format!("one scenario has {per_unit} lanes per model, but the device holds at most {max_lanes}");
-            return Err(Error::device(&self.device, problem, "use option `backend = cpu`, or fewer headways"));
+            return Err(Error::device(
+                &self.device,
+                problem,
+                format!("use {}, or fewer headways", option("backend = cpu")),
+            ));
         }
         let inside = matches!(&self.window, Some((at, held, _)) if *at == block && held.contains(&units.start));
         let mut cases = None;
@@ -234,8 +238,9 @@ impl<'p> GpuSession<'p> {
                 .into_par_iter()
                 .map(|at| Some(answer.outcomes[at % models][at / models].outcome(criteria)?.widen()))
                 .collect();
-            let outcomes = outcomes
-                .ok_or_else(|| Error::device(&self.device, "it did not write a lane", "use option `backend = cpu`"))?;
+            let outcomes = outcomes.ok_or_else(|| {
+                Error::device(&self.device, "it did not write a lane", format!("use {}", option("backend = cpu")))
+            })?;
             // Pieces come in the plan's order.
             chunk.outcomes.extend(outcomes);
         }

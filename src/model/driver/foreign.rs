@@ -4,7 +4,7 @@
 use std::sync::{Arc, RwLock};
 
 use super::ModelId;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Largest magnitude of an acceleration, m/s²: a larger one is an error of the driver.
 pub const MAX_ACCELERATION_MPS2: f32 = 100.0;
@@ -133,7 +133,11 @@ impl ModelId {
             None => Ok(()),
             Some(model) => {
                 let problem = format!("driver {} is a function of this process, which {what} cannot run", model.name());
-                Err(Error::usage(Place::option("models"), problem, "use option `backend = cpu`, or a built-in model"))
+                Err(Error::usage(
+                    Place::option("models"),
+                    problem,
+                    format!("use {}, or a built-in model", option("backend = cpu")),
+                ))
             }
         }
     }

@@ -1,38 +1,38 @@
 //! A concrete case from the few numbers that a user gives: on the command line, in a file, or in a row of a table.
 
+use std::ops::{Index, IndexMut};
+
+use super::case_quantity::CaseQuantity::{self, Gap, Thw};
 use super::case_quantity::{CaseNumber, NUMBERS};
 use super::units::{self, Written};
-use super::{Category, LANE_WIDTH_M, PlainCase, check_headway, missing_parameter};
+use super::{Category, LANE_WIDTH_M, PlainCase, check_headway};
 use crate::plausibility::{Doubts, HELP, Quantity};
 use crate::profile::FrameProfile;
 use lanesweep_support::table::{NameUnit, Resolved, resolve};
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
-/// Shortest and longest duration, s: the longest is the time cap of the paper's profile.
-pub(super) const DURATIONS_S: (f64, f64) = (0.1, 120.0);
-
-/// The given values; speeds in m/s, lengths in m, accelerations in m/s², times in s. The names are the flags of
-/// `simulate`.
+/// The given values; speeds in m/s, lengths in m, accelerations in m/s², times in s. A quantity is its index:
+/// `parameters[CaseQuantity::Gap]`.
 #[derive(Debug, Clone, Default, PartialEq)]
-#[allow(missing_docs)] // see PlainCase
 pub struct CaseParameters {
+    /// Kind of scenario, by name.
     pub category: Option<String>,
-    pub ego_speed: Option<f64>,
-    pub speed: Option<f64>,
-    pub gap: Option<f64>,
-    pub thw: Option<f64>,
-    pub lateral_speed: Option<f64>,
-    pub lateral_distance: Option<f64>,
-    pub acceleration: Option<f64>,
-    pub end_speed: Option<f64>,
-    pub ahead_speed: Option<f64>,
-    pub ahead_gap: Option<f64>,
-    pub length: Option<f64>,
-    pub width: Option<f64>,
-    pub ego_length: Option<f64>,
-    pub ego_width: Option<f64>,
-    pub lane_width: Option<f64>,
-    pub duration: Option<f64>,
+    /// By [`CaseQuantity`].
+    pub numbers: [Option<f64>; NUMBERS.len()],
+}
+
+impl Index<CaseQuantity> for CaseParameters {
+    type Output = Option<f64>;
+
+    fn index(&self, quantity: CaseQuantity) -> &Option<f64> {
+        &self.numbers[quantity as usize]
+    }
+}
+
+impl IndexMut<CaseQuantity> for CaseParameters {
+    fn index_mut(&mut self, quantity: CaseQuantity) -> &mut Option<f64> {
+        &mut self.numbers[quantity as usize]
+    }
 }
 
 /// A number of a case under the name that a user gives it: its key, with or without its unit at the end.
@@ -87,7 +87,7 @@ impl NamedNumber {
     /// # Errors
     /// [`Error::Usage`] at the key: a text that is no such quantity, or a speed without a unit.
     pub fn set(self, case: &mut CaseParameters, written: Written<'_>) -> Result<()> {
-        *(self.number().field)(case) = Some(self.si(written)?);
+        case[self.number().quantity] = Some(self.si(written)?);
         Ok(())
     }
 
@@ -105,10 +105,9 @@ impl NamedNumber {
 impl CaseParameters {
     /// Values of `self` where given, otherwise those of `other`. A gap replaces a headway, and vice versa.
     pub fn over(mut self, other: &CaseParameters) -> CaseParameters {
-        let has_start = self.gap.is_some() || self.thw.is_some();
-        for number in NUMBERS.iter().filter(|number| !(has_start && matches!(number.key, "gap" | "thw"))) {
-            let field = (number.field)(&mut self);
-            *field = field.or((number.get)(other));
+        let has_start = self[Gap].is_some() || self[Thw].is_some();
+        for &CaseNumber { quantity, .. } in NUMBERS.iter().filter(|n| !(has_start && matches!(n.quantity, Gap | Thw))) {
+            self[quantity] = self[quantity].or(other[quantity]);
         }
         self.category = self.category.or_else(|| other.category.clone());
         self
@@ -125,14 +124,8 @@ impl CaseParameters {
 
     /// Sets speeds that are noise of a standing vehicle to 0 and counts them; `place` returns the place of a key.
     pub(super) fn settle(&mut self, doubts: &mut Doubts, place: impl Fn(&str) -> String) {
-        let speeds = [
-            ("ego_speed", &mut self.ego_speed),
-            ("speed", &mut self.speed),
-            ("end_speed", &mut self.end_speed),
-            ("ahead_speed", &mut self.ahead_speed),
-        ];
-        for (key, speed) in speeds {
-            *speed = speed.map(|v| doubts.speed(v, || place(key)));
+        for &CaseNumber { quantity, key, .. } in NUMBERS.iter().filter(|number| number.needs_unit()) {
+            self[quantity] = self[quantity].map(|v| doubts.speed(v, || place(key)));
         }
     }
 
@@ -140,12 +133,12 @@ impl CaseParameters {
     ///
     /// # Errors
     /// [`Error::Usage`] for a value outside the physical range, unless such values are accepted.
-    pub fn check_plausible(&self, doubts: &mut Doubts) -> Result<()> {
-        for CaseNumber { key, plausible, get, .. } in &NUMBERS {
-            let (Some(quantity), Some(value)) = (*plausible, get(self)) else { continue };
+    pub(crate) fn check_plausible(&self, doubts: &mut Doubts) -> Result<()> {
+        for &CaseNumber { key, plausible, quantity, .. } in &NUMBERS {
+            let (Some(plausible), Some(value)) = (plausible, self[quantity]) else { continue };
             doubts
-                .check(quantity, value, || (*key).to_owned())
-                .map_err(|problem| Error::usage(Place::item(*key), problem, HELP))?;
+                .check(plausible, value, || key.to_owned())
+                .map_err(|problem| Error::usage(Place::item(key), problem, HELP.as_str()))?;
         }
         Ok(())
     }
@@ -165,7 +158,7 @@ impl CaseParameters {
             doubts.check(Quantity::Speed, last_mps, || "the speed that results from the acceleration".to_owned());
         is_plausible.map_err(|text| {
             let problem = format!("it results in a speed that no vehicle has: {text}");
-            let help = "a deceleration is negative; an acceleration needs an end: option `end_speed`";
+            let help = format!("a deceleration is negative; an acceleration needs an end: {}", option("end_speed"));
             Error::usage(Place::item("acceleration"), problem, help)
         })?;
         Ok(plain)
@@ -173,7 +166,7 @@ impl CaseParameters {
 
     /// Names of the given values.
     pub fn given(&self) -> Vec<&'static str> {
-        let numbers = NUMBERS.iter().filter_map(|number| (number.get)(self).map(|_| number.key));
+        let numbers = NUMBERS.iter().filter(|number| self[number.quantity].is_some()).map(|number| number.key);
         self.category.iter().map(|_| "category").chain(numbers).collect()
     }
 
@@ -183,58 +176,22 @@ impl CaseParameters {
     /// [`Error::Usage`] that names what is missing or out of range.
     pub fn plain_case(&self, length_m: f64, width_m: f64) -> Result<PlainCase> {
         let category = self.category()?;
-        self.refuse_of_other_categories(category)?;
-        let number = |key: &str| NUMBERS.iter().find(|number| number.key == key).and_then(|number| (number.get)(self));
-        if let Some(key) = missing_parameter(category, |key| number(key).is_some()) {
-            return Err(missing(key));
+        let given = || NUMBERS.iter().filter_map(|number| Some((number, self[number.quantity]?)));
+        // A lane has its width without lane changes too.
+        let is_foreign = |n: &CaseNumber| !n.categories.contains(&category) && n.quantity != CaseQuantity::LaneWidth;
+        // 0 means none.
+        if let Some((number, _)) = given().find(|(number, value)| is_foreign(number) && *value != 0.0) {
+            let problem = format!("{} has no such parameter", category.label());
+            let help = "leave it out, or choose the category that has it";
+            return Err(Error::usage(Place::item(number.key), problem, help));
         }
-        let given = |key: &str| number(key).unwrap_or(0.0);
-        let ego_speed_mps = at_least(given("ego_speed"), 0.0, "ego_speed")?;
+        if let Some(needed) = CaseQuantity::needed(category).iter().find(|needed| self[**needed].is_none()) {
+            return Err(missing(needed.number().key));
+        }
+        given().filter(|(number, _)| !is_foreign(number)).try_for_each(|(number, value)| number.check(value))?;
         self.check_start()?;
-        let length_m = above_zero(self.length.unwrap_or(length_m), "length")?;
-        let width_m = above_zero(self.width.unwrap_or(width_m), "width")?;
-        let ego_length_m = above_zero(self.ego_length.unwrap_or(length_m), "ego_length")?;
-        let ego_width_m = above_zero(self.ego_width.unwrap_or(width_m), "ego_width")?;
-        let lane_width_m = above_zero(self.lane_width.unwrap_or(LANE_WIDTH_M), "lane_width")?;
-        let speed_mps = at_least(self.speed.unwrap_or(ego_speed_mps), 0.0, "speed")?;
-        let acceleration_mps2 = at_least(self.acceleration.unwrap_or(0.0), f64::NEG_INFINITY, "acceleration")?;
-        let end_speed_mps = self.end_speed.map(|v| at_least(v, 0.0, "end_speed")).transpose()?;
-        let (lateral_speed_mps, lateral_distance_m) = match category {
-            Category::Lvd => (0.0, lane_width_m),
-            Category::CutIn | Category::CutOut => (
-                above_zero(given("lateral_speed"), "lateral_speed")?,
-                above_zero(self.lateral_distance.unwrap_or(lane_width_m), "lateral_distance")?,
-            ),
-        };
-        let (ahead_gap_m, ahead_speed_mps) = match category {
-            Category::CutOut => (
-                at_least(given("ahead_gap"), 0.0, "ahead_gap")?,
-                at_least(self.ahead_speed.unwrap_or(0.0), 0.0, "ahead_speed")?,
-            ),
-            Category::CutIn | Category::Lvd => (0.0, 0.0),
-        };
-        let (shortest_s, longest_s) = DURATIONS_S;
-        if let Some(duration_s) = self.duration.filter(|s| !(shortest_s..=longest_s).contains(s)) {
-            let help = format!("give seconds of at least {shortest_s} and at most {longest_s}");
-            return Err(Error::usage(Place::item("duration"), format!("{duration_s} cannot be used"), help));
-        }
-        Ok(PlainCase {
-            category,
-            ego_speed_mps,
-            speed_mps,
-            acceleration_mps2,
-            end_speed_mps,
-            lateral_speed_mps,
-            lateral_distance_m,
-            ahead_speed_mps,
-            ahead_gap_m,
-            length_m,
-            width_m,
-            ego_length_m,
-            ego_width_m,
-            lane_width_m,
-            duration_s: self.duration,
-        })
+        let acceleration_mps2 = self[CaseQuantity::Deceleration].unwrap_or(0.0);
+        Ok(PlainCase { acceleration_mps2, ..PlainCase::of(category, &|quantity| self[quantity], length_m, width_m) })
     }
 
     /// Checks the initial distance, if given.
@@ -242,29 +199,40 @@ impl CaseParameters {
     /// # Errors
     /// [`Error::Usage`] if both gap and headway are given, if one is out of range, or for a headway of an ego at rest.
     pub fn check_start(&self) -> Result<()> {
-        if self.gap.is_some() && self.thw.is_some() {
+        if self[Gap].is_some() && self[Thw].is_some() {
             let problem = "both gap and time headway are given";
             return Err(Error::usage(Place::item("thw"), problem, "leave one of the two empty"));
         }
-        self.gap.map_or(Ok(0.0), |gap_m| at_least(gap_m, 0.0, "gap"))?;
-        self.thw.map_or(Ok(0.0), |thw_s| at_least(thw_s, 0.0, "thw"))?;
-        self.ego_speed.map_or(Ok(()), |ego_speed_mps| check_headway(ego_speed_mps, self.thw))
+        [Gap, Thw].iter().try_for_each(|start| self[*start].map_or(Ok(()), |value| start.number().check(value)))?;
+        self[CaseQuantity::EgoSpeed].map_or(Ok(()), |ego_speed_mps| check_headway(ego_speed_mps, self[Thw]))
     }
+}
 
-    /// Refuses parameters that the category does not have. 0 is accepted because it means none.
-    fn refuse_of_other_categories(&self, category: Category) -> Result<()> {
-        let given = [
-            ("lateral_speed", self.lateral_speed, category == Category::Lvd),
-            ("lateral_distance", self.lateral_distance, category == Category::Lvd),
-            ("ahead_speed", self.ahead_speed, category != Category::CutOut),
-            ("ahead_gap", self.ahead_gap, category != Category::CutOut),
-        ];
-        match given.iter().find(|(_, value, is_foreign)| *is_foreign && value.is_some_and(|value| value != 0.0)) {
-            None => Ok(()),
-            Some((key, ..)) => {
-                let problem = format!("{} has no such parameter", category.label());
-                Err(Error::usage(Place::item(*key), problem, "leave it out, or choose the category that has it"))
-            }
+impl PlainCase {
+    /// The case of some quantities without an acceleration; others have the defaults of `simulate`, vehicles the size of
+    /// the arguments, m. What the category needs must be there.
+    pub fn of(category: Category, get: &dyn Fn(CaseQuantity) -> Option<f64>, length_m: f64, width_m: f64) -> PlainCase {
+        let value = |quantity, otherwise: f64| get(quantity).unwrap_or(otherwise);
+        let ego_speed_mps = value(CaseQuantity::EgoSpeed, 0.0);
+        let length_m = value(CaseQuantity::Length, length_m);
+        let width_m = value(CaseQuantity::Width, width_m);
+        let lane_width_m = value(CaseQuantity::LaneWidth, LANE_WIDTH_M);
+        PlainCase {
+            category,
+            ego_speed_mps,
+            speed_mps: value(CaseQuantity::OtherSpeed, ego_speed_mps),
+            acceleration_mps2: 0.0,
+            end_speed_mps: get(CaseQuantity::EndSpeed),
+            lateral_speed_mps: value(CaseQuantity::LateralSpeed, 0.0),
+            lateral_distance_m: value(CaseQuantity::LateralDistance, lane_width_m),
+            ahead_speed_mps: value(CaseQuantity::AheadSpeed, 0.0),
+            ahead_gap_m: value(CaseQuantity::AheadGap, 0.0),
+            length_m,
+            width_m,
+            ego_length_m: value(CaseQuantity::EgoLength, length_m),
+            ego_width_m: value(CaseQuantity::EgoWidth, width_m),
+            lane_width_m,
+            duration_s: get(CaseQuantity::Duration),
         }
     }
 }
@@ -278,28 +246,6 @@ fn missing(key: &str) -> Error {
         "lateral_speed" => "a speed in m/s",
         _ => "a speed with its unit, such as 60km/h,",
     };
-    let help = format!("give {what} with option `{key}` or as `{key}` in the file");
+    let help = format!("give {what} with {} or as `{key}` in the file", option(key));
     Error::usage(Place::item(key), "it is missing", help)
-}
-
-/// Maximum magnitude of a physical speed, length or acceleration.
-const MAX_MAGNITUDE: f64 = 1e6;
-
-fn at_least(value: f64, min: f64, key: &str) -> Result<f64> {
-    if value.abs() <= MAX_MAGNITUDE && value >= min {
-        return Ok(value);
-    }
-    let expected = if min.is_finite() {
-        format!("a number of at least {min} and at most 1e6")
-    } else {
-        "a number between -1e6 and 1e6".into()
-    };
-    Err(Error::usage(Place::item(key), format!("{value} cannot be used"), format!("give {expected}")))
-}
-
-fn above_zero(value: f64, key: &str) -> Result<f64> {
-    if value > 0.0 && value <= MAX_MAGNITUDE {
-        return Ok(value);
-    }
-    Err(Error::usage(Place::item(key), format!("{value} cannot be used"), "give a number above 0 and at most 1e6"))
 }

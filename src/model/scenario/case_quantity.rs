@@ -2,10 +2,12 @@
 //! measurement errors follow.
 
 use super::CaseParameters;
+use super::check::Bound;
 use super::units::{self, Written};
 use crate::category::Category;
 use crate::plausibility::Quantity;
 use lanesweep_support::table::{NameUnit, Named};
+use lanesweep_support::{Error, Place, Result};
 
 /// A quantity of a case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -75,8 +77,6 @@ pub struct CaseNumber {
     pub categories: &'static [Category],
     /// How accurately it is measured; `None` for what is not varied.
     pub error: Option<&'static MeasurementError>,
-    pub(super) get: fn(&CaseParameters) -> Option<f64>,
-    pub(super) field: fn(&mut CaseParameters) -> &mut Option<f64>,
 }
 
 /// Kilometres per hour in one metre per second.
@@ -113,8 +113,6 @@ macro_rules! number {
             axis_range: $range,
             categories: $categories,
             error: error!($($error)*),
-            get: |case| case.$key,
-            field: |case| &mut case.$key,
         }
     };
 }
@@ -168,6 +166,15 @@ impl CaseQuantity {
     pub fn number(self) -> &'static CaseNumber {
         &NUMBERS[self as usize]
     }
+
+    /// What a category needs, besides the initial distance.
+    pub fn needed(category: Category) -> &'static [CaseQuantity] {
+        match category {
+            Category::CutIn => &[CaseQuantity::EgoSpeed, CaseQuantity::LateralSpeed],
+            Category::CutOut => &[CaseQuantity::EgoSpeed, CaseQuantity::LateralSpeed, CaseQuantity::AheadGap],
+            Category::Lvd => &[CaseQuantity::EgoSpeed, CaseQuantity::Deceleration],
+        }
+    }
 }
 
 impl CaseNumber {
@@ -178,11 +185,29 @@ impl CaseNumber {
     pub fn set_text(&self, case: &mut CaseParameters, text: &str) -> std::result::Result<(), String> {
         let unit = if self.needs_unit() { NameUnit::Needed } else { NameUnit::Customary };
         let si = units::si(Written::Text(text), self.unit(), unit);
-        *(self.field)(case) = Some(si.map_err(|unusable| match unusable.lacks_unit {
+        case[self.quantity] = Some(si.map_err(|unusable| match unusable.lacks_unit {
             true => format!("{}; write {}", unusable.problem, unusable.write),
             false => format!("write {}", unusable.write),
         })?);
         Ok(())
+    }
+
+    /// Checks that a value is possible.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with the range.
+    pub(super) fn check(&self, value: f64) -> Result<()> {
+        let bound = match self.plausible {
+            Some(Quantity::Acceleration) => Bound::Finite,
+            Some(Quantity::Speed | Quantity::Gap | Quantity::Headway) => Bound::AtLeastZero,
+            Some(_) => Bound::AboveZero,
+            None => Bound::Duration,
+        };
+        if bound.holds(value) {
+            return Ok(());
+        }
+        let (problem, help) = (format!("{value} cannot be used"), format!("give {}", bound.words()));
+        Err(Error::usage(Place::item(self.key), problem, help))
     }
 
     /// Whether a value needs a unit: a speed along the road, which people give in km/h and in m/s.
@@ -203,7 +228,20 @@ impl CaseNumber {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{CaseFile, NamedNumber};
     use super::*;
+
+    /// A key that no quantity has is an error, never 0.
+    #[test]
+    fn a_misspelt_key_is_an_error() {
+        assert_eq!(NamedNumber::find("ego_sped").unwrap(), None);
+        let file = |text: &str| toml::from_str::<CaseFile>(text).map(|file| file.parameters);
+        assert!(file("ego_sped = '60km/h'").unwrap_err().to_string().contains("unknown field `ego_sped`"));
+        assert_eq!(file("gap = 10").unwrap()[CaseQuantity::Gap], Some(10.0));
+        let lacking = file("category = 'lvd'\nego_speed = '60km/h'").unwrap();
+        let error = lacking.plain_case(4.3, 1.9).unwrap_err().to_string();
+        assert!(error.contains("acceleration") && error.contains("it is missing"), "{error}");
+    }
 
     #[test]
     fn the_table_has_the_order_of_the_quantities() {

@@ -44,10 +44,10 @@ pub(super) fn check(scenario: &Scenario) -> std::result::Result<(), Problem> {
         }
     }
     expect((MIN_RATE_HZ..=MAX_MAGNITUDE).contains(&s.fps), "fps", s.fps, "a number of at least 0.1 and at most 1e6")?;
-    above_zero("lane_width", s.lane_width)?;
-    at_least_zero("ego.v0", s.ego.v0)?;
-    above_zero("ego.length", s.ego.length)?;
-    above_zero("ego.width", s.ego.width)?;
+    Bound::AboveZero.check("lane_width", s.lane_width)?;
+    Bound::AtLeastZero.check("ego.v0", s.ego.v0)?;
+    Bound::AboveZero.check("ego.length", s.ego.length)?;
+    Bound::AboveZero.check("ego.width", s.ego.width)?;
     let samples = s.target.v.len();
     if samples < 2 {
         return Err(Problem {
@@ -61,7 +61,7 @@ pub(super) fn check(scenario: &Scenario) -> std::result::Result<(), Problem> {
         check_other("lead", lead, samples)?;
     }
     for (field, value) in [("thw0", s.thw0), ("gap0", s.gap0), ("D", s.lead_gap), ("peak_decel", s.peak_decel)] {
-        value.map_or(Ok(()), |value| finite(field, value))?;
+        value.map_or(Ok(()), |value| Bound::Finite.check(field, value))?;
         // The target of a cut-in may begin beside the ego.
         let is_ahead = field == "D" || (field != "peak_decel" && s.category != Category::CutIn);
         let (value, what) = (value.unwrap_or(0.0), "at least 0: a vehicle beside or behind is not ahead");
@@ -78,8 +78,8 @@ pub(super) fn check(scenario: &Scenario) -> std::result::Result<(), Problem> {
 }
 
 fn check_other(role: &str, other: &Other, samples: usize) -> std::result::Result<(), Problem> {
-    above_zero(&format!("{role}.length"), other.length)?;
-    above_zero(&format!("{role}.width"), other.width)?;
+    Bound::AboveZero.check(&format!("{role}.length"), other.length)?;
+    Bound::AboveZero.check(&format!("{role}.width"), other.width)?;
     for (field, series) in [("v", &other.v), ("y", &other.y)] {
         if series.len() != samples {
             return Err(Problem {
@@ -90,10 +90,10 @@ fn check_other(role: &str, other: &Other, samples: usize) -> std::result::Result
         }
     }
     for (k, &v) in other.v.iter().enumerate() {
-        at_least_zero(&format!("{role}.v[{k}]"), v)?;
+        Bound::AtLeastZero.check(&format!("{role}.v[{k}]"), v)?;
     }
     for (k, &y) in other.y.iter().enumerate() {
-        finite(&format!("{role}.y[{k}]"), y)?;
+        Bound::Finite.check(&format!("{role}.y[{k}]"), y)?;
     }
     Ok(())
 }
@@ -106,22 +106,42 @@ const MIN_RATE_HZ: f64 = 0.1;
 
 /// Maximum magnitude of a physical length, speed or rate; beyond it, squares in the lane arithmetic lose their meaning.
 const MAX_MAGNITUDE: f64 = 1e6;
+/// Shortest and longest duration of a case, s: the longest is the time cap of the paper's profile.
+pub(super) const DURATIONS_S: (f64, f64) = (0.1, 120.0);
 
-fn finite(field: &str, value: f64) -> std::result::Result<(), Problem> {
-    expect(value.abs() <= MAX_MAGNITUDE, field, value, "a number between -1e6 and 1e6")
+/// What a number of a scenario or a case can be.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Bound {
+    Finite,
+    AtLeastZero,
+    AboveZero,
+    Duration,
 }
 
-fn at_least_zero(field: &str, value: f64) -> std::result::Result<(), Problem> {
-    expect(
-        (0.0..=MAX_MAGNITUDE).contains(&value),
-        field,
-        value,
-        "a number of at least 0 and at most 1e6 (a speed above -0.5 counts as 0)",
-    )
-}
+impl Bound {
+    pub(super) fn holds(self, value: f64) -> bool {
+        let is_in = match self {
+            Bound::Finite => true,
+            Bound::AtLeastZero => value >= 0.0,
+            Bound::AboveZero => value > 0.0,
+            Bound::Duration => (DURATIONS_S.0..=DURATIONS_S.1).contains(&value),
+        };
+        is_in && value.abs() <= MAX_MAGNITUDE
+    }
 
-fn above_zero(field: &str, value: f64) -> std::result::Result<(), Problem> {
-    expect(value > 0.0 && value <= MAX_MAGNITUDE, field, value, "a number above 0 and at most 1e6")
+    pub(super) fn words(self) -> &'static str {
+        match self {
+            Bound::Finite => "a number between -1e6 and 1e6",
+            Bound::AtLeastZero => "a number of at least 0 and at most 1e6",
+            Bound::AboveZero => "a number above 0 and at most 1e6",
+            Bound::Duration => "seconds of at least 0.1 and at most 120",
+        }
+    }
+
+    fn check(self, field: &str, value: f64) -> std::result::Result<(), Problem> {
+        let still = if self == Bound::AtLeastZero { " (a speed above -0.5 counts as 0)" } else { "" };
+        expect(self.holds(value), field, value, &format!("{}{still}", self.words()))
+    }
 }
 
 fn expect(holds: bool, field: &str, value: f64, what: &str) -> std::result::Result<(), Problem> {
@@ -150,38 +170,41 @@ pub(super) fn admit(
     }
     check(scenario)?;
     let s = &*scenario;
-    let mut check_plausible = |quantity, field: &str, value, words: &dyn Fn(String) -> String| {
-        let judged = doubts.check(quantity, value, || place(field));
-        judged.map_err(|text| Problem { field: field.to_owned(), problem: words(text), help: HELP })
+    let mut check_plausible = |quantity, field: &str, value, prefix: &str| {
+        let checked = doubts.check(quantity, value, || place(field));
+        checked.map_err(|text| Problem {
+            field: field.to_owned(),
+            problem: format!("{prefix}{text}"),
+            help: HELP.as_str(),
+        })
     };
-    let is = |text: String| text;
-    check_plausible(Quantity::Rate, "fps", s.fps, &is)?;
-    check_plausible(Quantity::LaneWidth, "lane_width", s.lane_width, &is)?;
-    check_plausible(Quantity::Speed, "ego.v0", s.ego.v0, &is)?;
-    check_plausible(Quantity::Length, "ego.length", s.ego.length, &is)?;
-    check_plausible(Quantity::Width, "ego.width", s.ego.width, &is)?;
-    for (field, quantity, value) in
-        [("gap0", Quantity::Gap, s.gap0), ("D", Quantity::Gap, s.lead_gap), ("thw0", Quantity::Headway, s.thw0)]
-    {
-        value.map_or(Ok(()), |value| check_plausible(quantity, field, value, &is))?;
+    let numbers = [
+        (Quantity::Rate, "fps", Some(s.fps)),
+        (Quantity::LaneWidth, "lane_width", Some(s.lane_width)),
+        (Quantity::Speed, "ego.v0", Some(s.ego.v0)),
+        (Quantity::Length, "ego.length", Some(s.ego.length)),
+        (Quantity::Width, "ego.width", Some(s.ego.width)),
+        (Quantity::Gap, "gap0", s.gap0),
+        (Quantity::Gap, "D", s.lead_gap),
+        (Quantity::Headway, "thw0", s.thw0),
+    ];
+    for (quantity, field, value) in numbers {
+        value.map_or(Ok(()), |value| check_plausible(quantity, field, value, ""))?;
     }
     for (role, other) in [("target", Some(&s.target)), ("lead", s.lead.as_ref())] {
         let Some(other) = other else { continue };
-        check_plausible(Quantity::Length, &format!("{role}.length"), other.length, &is)?;
-        check_plausible(Quantity::Width, &format!("{role}.width"), other.width, &is)?;
-        let mut worst =
-            |quantity, series: &str, values: &mut dyn Iterator<Item = f64>, words: &dyn Fn(String) -> String| {
-                let Some((k, value)) = farthest(quantity, values) else { return Ok(()) };
-                check_plausible(quantity, &format!("{role}.{series}[{k}]"), value, words)
-            };
-        worst(Quantity::Speed, "v", &mut other.v.iter().copied(), &is)?;
-        worst(Quantity::LateralPosition, "y", &mut other.y.iter().copied(), &is)?;
-        let jump = |text: String| format!("lateral jump: {text}");
-        worst(Quantity::LateralSpeed, "y", &mut rates(&other.y, 1, s.fps), &jump)?;
+        check_plausible(Quantity::Length, &format!("{role}.length"), other.length, "")?;
+        check_plausible(Quantity::Width, &format!("{role}.width"), other.width, "")?;
+        let mut worst = |quantity, series: &str, values: &mut dyn Iterator<Item = f64>, prefix: &str| {
+            let Some((k, value)) = farthest(quantity, values) else { return Ok(()) };
+            check_plausible(quantity, &format!("{role}.{series}[{k}]"), value, prefix)
+        };
+        worst(Quantity::Speed, "v", &mut other.v.iter().copied(), "")?;
+        worst(Quantity::LateralPosition, "y", &mut other.y.iter().copied(), "")?;
+        worst(Quantity::LateralSpeed, "y", &mut rates(&other.y, 1, s.fps), "lateral jump: ")?;
         // Changes are taken over one second, because single samples of recorded speeds are noisy.
         let second = (s.fps.round() as usize).max(1);
-        let mean = |text: String| format!("mean of a second: {text}");
-        worst(Quantity::Acceleration, "v", &mut rates(&other.v, second, s.fps), &mean)?;
+        worst(Quantity::Acceleration, "v", &mut rates(&other.v, second, s.fps), "mean of a second: ")?;
     }
     Ok(())
 }

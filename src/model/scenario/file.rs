@@ -19,9 +19,8 @@ use super::schema::wrong_field;
 use super::{Scenario, table_reader};
 use crate::plausibility::Implausible;
 use lanesweep_support::atomic_file::AtomicFile;
-use lanesweep_support::input_file;
 use lanesweep_support::table::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter};
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, input_file};
 
 /// Formats for writing; the first is the default for names without an ending.
 const WRITTEN: [TableFormat; 2] = [TableFormat::JsonLines, TableFormat::Parquet];

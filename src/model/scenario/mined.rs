@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::parameterization::ReducedScenario;
 use crate::category::Category;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Side of the ego's lane, in the direction of travel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -168,7 +168,7 @@ impl Scenario {
         self.gap0.or(self.thw0.map(|thw_s| thw_s * self.ego.v0)).ok_or_else(|| {
             Error::input(
                 Place::item(format!("scenario {}", self.id)).column("gap0"),
-                "the recorded gap at the start is absent, but option `thw = observed` starts from it",
+                format!("the recorded gap at the start is absent, but {} starts from it", option("thw = observed")),
                 "give gap0 (m) or thw0 (s), or headways in seconds",
             )
         })

@@ -19,8 +19,7 @@ mod schema;
 mod table_reader;
 mod units;
 
-pub use crate::case::{Ahead, Case, LANE_WIDTH_M, Participant, PlainCase};
-pub use crate::case::{check_headway, missing_parameter};
+pub use crate::case::{Ahead, Case, LANE_WIDTH_M, Participant, PlainCase, check_headway};
 pub use crate::category::Category;
 pub use crate::motion::{LATERAL_SAMPLED, Lateral, LateralState, Motion, SPEED_SAMPLED, Speed, Tables};
 pub use case_file::CaseFile;

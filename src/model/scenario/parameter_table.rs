@@ -3,9 +3,9 @@
 
 use serde_json::Value;
 
-use super::case_parameters::{CaseParameters, DURATIONS_S, NamedNumber};
-use super::case_quantity::{CaseNumber, NUMBERS};
-use super::check::name;
+use super::case_parameters::{CaseParameters, NamedNumber};
+use super::case_quantity::{CaseNumber, CaseQuantity, NUMBERS};
+use super::check::{DURATIONS_S, name};
 use super::columns::{Chosen, HELP, choose};
 use super::found::{ScenarioFile, ScenariosRead};
 use super::units::{Written, si};
@@ -263,9 +263,10 @@ fn of_row(
     let case = plain.case(DURATIONS_S.1)?;
     let rate_hz = rate_hz.unwrap_or(RATE_HZ);
     let duration_s = plain.duration_s.unwrap_or(case.horizon_s.max(MIN_DEFAULT_DURATION_S));
-    let of_headway = parameters.thw.map(|thw_s| thw_s * plain.ego_speed_mps);
-    let of_gap = parameters.gap.filter(|_| plain.ego_speed_mps > 0.0).map(|gap_m| gap_m / plain.ego_speed_mps);
-    let (gap0, thw0) = (parameters.gap.or(of_headway), parameters.thw.or(of_gap));
+    let (gap0, thw0) = (parameters[CaseQuantity::Gap], parameters[CaseQuantity::Thw]);
+    let of_headway = thw0.map(|thw_s| thw_s * plain.ego_speed_mps);
+    let of_gap = gap0.filter(|_| plain.ego_speed_mps > 0.0).map(|gap_m| gap_m / plain.ego_speed_mps);
+    let (gap0, thw0) = (gap0.or(of_headway), thw0.or(of_gap));
     // Whole steps, so that the last sample is not before the end.
     let count = ((duration_s * rate_hz - 1e-9).ceil() + 1.0).max(2.0);
     *samples += count;

@@ -6,8 +6,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use lanesweep_support::files::{remove_file, write_atomically};
-use lanesweep_support::input_file;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, input_file, option};
 
 /// Driven time and distance of the recordings that were searched for scenarios.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -79,7 +78,7 @@ impl DataProvenance {
     /// Path of the provenance file: `scenarios.jsonl` → `scenarios.exposure.json`. Other formats keep their ending, so
     /// that the same scenarios in two formats have one file each: `scenarios.parquet` →
     /// `scenarios.parquet.exposure.json`.
-    pub fn path_of(scenarios: &Path) -> PathBuf {
+    pub(crate) fn path_of(scenarios: &Path) -> PathBuf {
         match scenarios.extension().and_then(|ending| ending.to_str()) {
             Some(ending @ ("parquet" | "csv")) => scenarios.with_extension(format!("{ending}.exposure.json")),
             _ => scenarios.with_extension("exposure.json"),
@@ -127,7 +126,11 @@ impl DataProvenance {
             read => read?,
         };
         let wrong = |place: Place, problem: String| {
-            let help = "mine the recordings again, or remove this file and give option `hours` and option `km`";
+            let help = format!(
+                "mine the recordings again, or remove this file and give {} and {}",
+                option("hours"),
+                option("km")
+            );
             Err(Error::input(place, problem, help))
         };
         let content: ProvenanceFile = match serde_json::from_slice(&text) {

@@ -5,7 +5,7 @@
 use lanesweep_engine::{LaneCase, Trace};
 use lanesweep_model::scalar::Real;
 use lanesweep_model::scenario::{Category, Side, Tables};
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Who drives the ego.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -104,7 +104,8 @@ impl Concrete {
             if !(2..=MAX_VERTICES).contains(&count) {
                 let problem = format!("the path of {} has {count} vertices", vehicle.name);
                 let help = format!(
-                    "2 to {MAX_VERTICES} can be written: use a longer time step or a shorter option `duration`"
+                    "2 to {MAX_VERTICES} can be written: use a longer time step or a shorter {}",
+                    option("duration")
                 );
                 return Err(Error::input(place(), problem, help));
             }

@@ -14,7 +14,7 @@ use lanesweep_model::scalar::Real;
 use lanesweep_model::scenario::parameterization::{Sizes, VehicleSize};
 use lanesweep_model::scenario::{Category, LATERAL_SAMPLED, Motion, SPEED_SAMPLED, Scenario, Side, Tables};
 use lanesweep_run::reopen::{Reopened, TracedCase};
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Options of the export.
 #[derive(Debug, Clone, Copy)]
@@ -314,12 +314,14 @@ fn sizes_of_case(lane: &str, case: &LaneCase<f64>, known: Option<&Sizes>, ego_le
     }
     if let Some((what, expected, lane_has)) = pairs.iter().find(|(_, a, b)| (a - b).abs() > TOLERANCE_M) {
         let problem = format!("the {what} is {expected} m by the scenarios and {lane_has} m in the run");
-        let help =
-            "give the scenario file of the run (option `scenarios`), or leave it out: every gap and contact stays";
+        let help = format!(
+            "give the scenario file of the run ({}), or leave it out: every gap and contact stays",
+            option("scenarios")
+        );
         return Err(Error::input(Place::item(format!("lane {lane}")), problem, help));
     }
     if is_pair && known.lead.is_none() {
-        let help = "give the scenario file of the run (option `scenarios`), or leave it out";
+        let help = format!("give the scenario file of the run ({}), or leave it out", option("scenarios"));
         return Err(Error::input(Place::item(format!("lane {lane}")), "the vehicle ahead has no size", help));
     }
     Ok(*known)

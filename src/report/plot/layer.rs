@@ -420,26 +420,3 @@ fn without_inner_points(places: &[Position]) -> Vec<Position> {
     }
     kept
 }
-
-#[cfg(test)]
-mod tests {
-    use super::super::axis::{Axis, AxisScale};
-    use super::*;
-
-    #[test]
-    fn around_a_centre_a_line_is_broken_at_every_gap_and_runs_over_the_top() {
-        let runs = |values: &[f64]| {
-            let values = values.iter().enumerate().map(|(k, v)| (k as f64, *v).into()).collect();
-            let series = Series { values, ..Series::default() };
-            let axis = Axis::around(AxisScale::Linear, &[0.0, 9.0], (0.0, 9.0)).unwrap();
-            let axes = Axes { x: axis, y: axis, centre: Some((0.0, 0.0)) };
-            let runs = series.runs(&axes).into_iter();
-            runs.map(|(run, closes)| (run.iter().map(|value| value.x).collect(), closes))
-                .collect::<Vec<(Vec<f64>, _)>>()
-        };
-        let gap = f64::NAN;
-        assert_eq!(runs(&[1.0, 1.0, 1.0, 1.0]), [(vec![0.0, 1.0, 2.0, 3.0], true)]);
-        assert_eq!(runs(&[1.0, gap, 1.0, gap, 1.0]), [(vec![2.0], false), (vec![4.0, 0.0], false)]);
-        assert!(runs(&[gap, gap]).is_empty());
-    }
-}

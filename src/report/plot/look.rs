@@ -91,14 +91,3 @@ impl Look {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn no_two_series_look_alike() {
-        let looks: std::collections::BTreeSet<_> = (0..49).map(|i| (i % COLOURS.len(), Look::of(i, 49).dash)).collect();
-        assert_eq!(looks.len(), 49);
-    }
-}

@@ -19,8 +19,6 @@ pub(super) use look::{Look, Symbol};
 pub(super) use axis::{logarithmic_reach, number, plain_end, quantity};
 use layer::{HOLLOW, fill_sample};
 pub(super) use layer::{TICK, is_few};
-#[cfg(test)]
-pub(super) use svg::tests::words;
 pub(super) use svg::{Anchor, Canvas, GREY, INK, Type, set};
 
 use axis::{Axes, on_circle};

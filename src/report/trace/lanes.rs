@@ -1,8 +1,8 @@
 //! Lanes step by step, as `simulate` shows them: figure, table, document and summaries.
 
 use super::{TraceFigure, TracePanels, TraceSeries, table};
-use crate::lanes::outcome_json;
-use crate::records::{self, PROGRAM};
+use crate::lanes::outcome_record;
+use crate::records::{self, PROGRAM, record};
 use lanesweep_engine::{EndReason, NO_STEP, Outcome, Trace};
 use lanesweep_model::criterion::Criterion;
 use lanesweep_run::reopen::{TracedLane, TracedLanes};
@@ -51,24 +51,23 @@ impl TraceReport<'_> {
     /// # Errors
     /// None for a document of this program.
     pub fn json(&self) -> Result<String> {
-        let outcomes = self.0.lanes.iter().map(|lane| {
-            let reference = lane.reference.as_ref().map(|reference| outcome_json(reference, lane.trace.dt_s));
-            serde_json::json!({
-                "lane": lane.key,
-                "category": lane.trace.category.key(),
-                "model": lane.trace.model.name(),
-                "initial_gap_m": lane.trace.initial_gap_m,
-                "outcome": outcome_json(&lane.trace.outcome, lane.trace.dt_s),
-                "reference": reference,
-            })
+        let lanes = self.0.lanes.iter().map(|lane| {
+            record! {
+                category: lane.trace.category.key(),
+                initial_gap_m: lane.trace.initial_gap_m,
+                lane: &lane.key,
+                model: lane.trace.model.name(),
+                outcome: outcome_record(&lane.trace.outcome, lane.trace.dt_s),
+                reference: lane.reference.as_ref().map(|reference| outcome_record(reference, lane.trace.dt_s)),
+            }
         });
-        records::document(&serde_json::json!({
-            "program": PROGRAM,
-            "data": self.0.origin,
-            "synthetic": self.0.is_synthetic,
-            "lanes": outcomes.collect::<Vec<_>>(),
-            "steps": table(&self.named()).records(),
-        }))
+        records::document(&record! {
+            data: &self.0.origin,
+            lanes: lanes.collect::<Vec<_>>(),
+            program: PROGRAM,
+            steps: table(&self.named()).records(),
+            synthetic: self.0.is_synthetic,
+        })
     }
 
     /// How the lanes ended, in words.

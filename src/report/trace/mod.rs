@@ -7,8 +7,7 @@ mod lanes;
 mod panels;
 mod positions;
 
-use super::plot::number;
-use super::plot::{Anchor, Canvas, Ends, Figure, INK, Look, Plot, TICK, Type, set};
+use super::plot::{Anchor, Canvas, Ends, Figure, INK, Look, Plot, TICK, Type, number, set};
 pub use lanes::TraceReport;
 use lanesweep_engine::{StepMark, Trace, TracedStep};
 use lanesweep_support::table::Table;
@@ -175,6 +174,3 @@ pub fn table(traces: &[(String, &Trace)]) -> Table {
 
 /// A step of a named trace.
 type Row<'a> = (&'a String, &'a Trace, &'a TracedStep);
-
-#[cfg(test)]
-mod trace_tests;

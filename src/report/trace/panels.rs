@@ -1,7 +1,6 @@
 //! The panels of a case's figure as plots. The figure arranges them on the sheet.
 
-use super::super::plot::plain_end;
-use super::super::plot::{GREY, Height, INK, Look, Mark, Plot, PlotAxis, Rule, Series, Symbol, Value};
+use super::super::plot::{GREY, Height, INK, Look, Mark, Plot, PlotAxis, Rule, Series, Symbol, Value, plain_end};
 use super::thousandths;
 use lanesweep_engine::{StepMark, Trace, TracedStep, TracedVehicle};
 

@@ -1,9 +1,8 @@
 //! The verdict by other rules and readings: which reference drivers have to avoid the collision, and what the profile
 //! says where Annex 3 is silent.
 
-use super::annex;
 use super::verdict::{DriverRule, settled};
-use super::{Changed, Check, StepBudget, Verdict, flips};
+use super::{Changed, Check, StepBudget, Verdict, annex, flips};
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::profile::Profile;
 use lanesweep_support::Result;

@@ -6,7 +6,7 @@ use lanesweep_model::driver::ModelId;
 use lanesweep_model::profile::Profile;
 use lanesweep_model::scenario::parameterization::{TimeGrid, recorded_case};
 use lanesweep_model::scenario::{Case, Category, Lateral, PlainCase, Scenario, Speed, Tables};
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// A concrete case.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,7 +77,11 @@ impl Subject {
     pub fn recorded(scenario: Scenario, headway: Option<Headway>) -> Result<Subject> {
         let missing = || {
             let problem = format!("scenario {} has no observed gap", scenario.id);
-            Error::usage(Place::item("gap, thw"), problem, "give option `gap` in metres or option `thw` in seconds")
+            Error::usage(
+                Place::item("gap, thw"),
+                problem,
+                format!("give {} in metres or {} in seconds", option("gap"), option("thw")),
+            )
         };
         let other_mps = scenario.target.v.first().copied().unwrap_or(0.0).max(0.0);
         let ego_mps = if scenario.category == Category::Lvd { other_mps } else { scenario.ego.v0 };

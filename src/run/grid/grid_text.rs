@@ -6,7 +6,7 @@ use super::{CaseStyle, Grid, GridParts, jrc_case};
 use lanesweep_model::plausibility::Doubts;
 use lanesweep_model::profile::Profile;
 use lanesweep_model::scenario::{CaseQuantity, Category, LANE_WIDTH_M};
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// A grid as text: an axis is `NAME=FROM..TO/STEP` or `NAME=A,B,C`.
 #[derive(Debug, Clone, Default)]
@@ -34,12 +34,12 @@ impl GridText {
         let axis = |text: &Option<String>, name: &str| match text.as_deref().map(str::trim) {
             Some(text) => GridAxis::parse(category, text, name),
             None => {
-                let help = "give both option `x` and option `y`, or option `preset`";
+                let help = format!("give both {} and {}, or {}", option("x"), option("y"), option("preset"));
                 Err(Error::usage(Place::item(name), "it is missing", help))
             }
         };
-        let (x, y) = (axis(&self.x, "option `x`")?, axis(&self.y, "option `y`")?);
-        let panel = |text: &String| GridAxis::parse(category, text, "option `panel`");
+        let (x, y) = (axis(&self.x, &option("x"))?, axis(&self.y, &option("y"))?);
+        let panel = |text: &String| GridAxis::parse(category, text, &option("panel"));
         Ok(GridParts {
             fixed: self.set.iter().map(|text| value(category, text)).collect::<Result<_>>()?,
             panel_axes: self.panel.iter().map(panel).collect::<Result<_>>()?,
@@ -51,12 +51,16 @@ impl GridText {
 }
 
 fn value(category: Category, text: &str) -> Result<(&'static MapParameter, f64)> {
-    let axis = GridAxis::parse(category, text, "option `set`")?;
+    let axis = GridAxis::parse(category, text, &option("set"))?;
     match axis.values[..] {
         [value] => Ok((axis.parameter, value)),
         _ => {
             let problem = format!("`{text}` has {} values", axis.len());
-            Err(Error::usage(Place::option("set"), problem, "give one, or make it an axis with option `panel`"))
+            Err(Error::usage(
+                Place::option("set"),
+                problem,
+                format!("give one, or make it an axis with {}", option("panel")),
+            ))
         }
     }
 }
@@ -79,14 +83,14 @@ impl Grid {
     /// set.
     pub fn held(&self, profile: &Profile) -> Vec<String> {
         let number = |value: f64| format!("{}", (value * 1e6).round() / 1e6);
-        let mut held: Vec<String> = (self.fixed().iter())
+        let mut held: Vec<String> = (self.fixed.iter())
             .map(|(parameter, value)| {
                 let mut label = parameter.label.to_owned();
                 label[..1].make_ascii_lowercase();
                 format!("{label} {} {}", number(*value), parameter.unit)
             })
             .collect();
-        let (category, is_jrc) = (self.category(), self.style() != CaseStyle::Plain);
+        let (category, is_jrc) = (self.category, self.style != CaseStyle::Plain);
         let point = self.point(0);
         let sets = |quantity| point.get(quantity).is_some();
         if !sets(CaseQuantity::OtherSpeed) {

@@ -4,7 +4,7 @@ use crate::check::Answer;
 use lanesweep_engine::{Executor, LanePlan, LaneRunner, SweepSummary, Verdicts, Wanted};
 use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::ModelId;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 use super::Grid;
 use super::plan::{GridPart, GridPlan};
@@ -152,11 +152,12 @@ impl GridMap {
         let problem =
             format!("all {lanes} lanes end at the time cap of {} s{alone}: the map is empty", frame.time_cap_s);
         let help = format!(
-            "check the time step ({} s, option `dt`), `frame.time_cap_s` of the profile, and the grid's speeds, lateral speeds \
+            "check the time step ({} s, {}), `frame.time_cap_s` of the profile, and the grid's speeds, lateral speeds \
              and gaps",
-            frame.dt_s
+            frame.dt_s,
+            option("dt")
         );
-        Err(Error::usage(Place::item(format!("map {}", plan.grid.name())), problem, help))
+        Err(Error::usage(Place::item(format!("map {}", plan.grid.name)), problem, help))
     }
 
     /// Number of cells.
@@ -211,7 +212,7 @@ fn meets(plan: &LanePlan) -> bool {
 /// Boundary lines between neighbouring cells of a panel that differ in kind. Each line follows cell edges from `(x, y)`
 /// to `(x, y)`, in cells from the panel's lower left corner. Straight runs are one line.
 pub fn boundary(grid: &Grid, kind: &dyn Fn(usize, usize) -> usize) -> Vec<((usize, usize), (usize, usize))> {
-    let (nx, ny) = (grid.x().len(), grid.y().len());
+    let (nx, ny) = (grid.x.len(), grid.y.len());
     let mut lines = Vec::new();
     for j in 1..ny {
         for (from, to) in runs(nx, &|i| kind(i, j - 1) != kind(i, j)) {

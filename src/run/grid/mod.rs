@@ -27,11 +27,13 @@ pub use run::{Map, MapGrids, MapOptions, MapResult, MappedGrid};
 
 pub use lanesweep_model::scenario::CaseQuantity;
 
+use std::ops::Deref;
+
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::profile::Profile;
-use lanesweep_model::scenario::{Case, Category, NUMBERS, missing_parameter};
+use lanesweep_model::scenario::{Case, Category};
 use lanesweep_support::ranges::refuse_repeats;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Maximum number of cells of a grid.
 const MAX_CELLS: usize = 1_000_000;
@@ -100,6 +102,14 @@ impl GridParts {
     }
 }
 
+impl Deref for Grid {
+    type Target = GridParts;
+
+    fn deref(&self) -> &GridParts {
+        &self.parts
+    }
+}
+
 impl Grid {
     /// Checks that every quantity is given once, that none is missing, and that there are not too many cells.
     ///
@@ -125,7 +135,7 @@ impl Grid {
         }
         let mut grid = Grid { parts, panels, perturbation: None };
         grid.leave_out_backwards();
-        if grid.parts.closing_only {
+        if grid.closing_only {
             grid.leave_out_receding()?;
         }
         Ok(grid)
@@ -138,8 +148,7 @@ impl Grid {
         let (left, kept): (Vec<_>, Vec<_>) =
             self.panels.iter().cloned().partition(|panel| other_mps(panel).is_some_and(|mps| mps < 0.0));
         let Some(first) = left.first().filter(|_| !kept.is_empty()) else { return };
-        let values =
-            self.parts.panel_axes.iter().zip(first).map(|(axis, value)| format!("{}={value}", axis.parameter.key));
+        let values = self.panel_axes.iter().zip(first).map(|(axis, value)| format!("{}={value}", axis.parameter.key));
         tracing::warn!(
             "{} of {} panels are left out: the other vehicle would drive backwards, first at {}",
             left.len(),
@@ -155,7 +164,7 @@ impl Grid {
         for panel in &self.panels {
             let Some((ego_mps, other_mps)) = speeds(&self.panel_point(panel)) else {
                 let problem = "the speeds of both vehicles must be the panel's or fixed".to_owned();
-                let help = "give both by option `panel` or option `set`, or leave `map.closing` out";
+                let help = format!("give both by {} or {}, or leave `map.closing` out", option("panel"), option("set"));
                 return Err(Error::usage(Place::item("map.closing"), problem, help));
             };
             if ego_mps > other_mps {
@@ -174,90 +183,47 @@ impl Grid {
         Ok(())
     }
 
-    /// Name, for files and tables.
-    pub fn name(&self) -> &str {
-        &self.parts.name
-    }
-
-    /// Kind of scenario.
-    pub fn category(&self) -> Category {
-        self.parts.category
-    }
-
-    /// The horizontal axis.
-    pub fn x(&self) -> &GridAxis {
-        &self.parts.x
-    }
-
-    /// The vertical axis.
-    pub fn y(&self) -> &GridAxis {
-        &self.parts.y
-    }
-
-    /// Parameters that distinguish the panels.
-    pub fn panel_axes(&self) -> &[GridAxis] {
-        &self.parts.panel_axes
-    }
-
     /// The panels: a value for each of [`Grid::panel_axes`]. At least one.
     pub fn panels(&self) -> &[Vec<f64>] {
         &self.panels
     }
 
-    /// Values that are equal in every cell.
-    pub fn fixed(&self) -> &[(&'static MapParameter, f64)] {
-        &self.parts.fixed
-    }
-
-    /// How a point becomes a case.
-    pub fn style(&self) -> CaseStyle {
-        self.parts.style
-    }
-
-    /// Whether each model starts at its own distance.
-    pub fn has_native_gap(&self) -> bool {
-        self.parts.native_gap
-    }
-
     /// Number of cells.
     pub fn cell_count(&self) -> usize {
-        self.panels.len() * self.parts.x.len() * self.parts.y.len()
+        self.panels.len() * self.x.len() * self.y.len()
     }
 
     /// Index of a cell from panel, horizontal index and vertical index.
     pub fn cell(&self, panel: usize, i: usize, j: usize) -> usize {
-        (panel * self.parts.y.len() + j) * self.parts.x.len() + i
+        (panel * self.y.len() + j) * self.x.len() + i
     }
 
     /// Panel, horizontal index and vertical index of a cell below [`Grid::cell_count`].
     pub fn places(&self, cell: usize) -> (usize, usize, usize) {
-        let (nx, ny) = (self.parts.x.len(), self.parts.y.len());
+        let (nx, ny) = (self.x.len(), self.y.len());
         (cell / (nx * ny), cell % nx, cell / nx % ny)
     }
 
     /// The values of a cell in the units of their parameters: first the panel's, then `y`, then `x`.
     pub fn values(&self, cell: usize) -> Vec<(&'static MapParameter, f64)> {
         let (panel, i, j) = self.places(cell);
-        let of_panel = self.parts.panel_axes.iter().map(|a| a.parameter).zip(self.panels[panel].iter().copied());
-        of_panel
-            .chain([(self.parts.y.parameter, self.parts.y.values[j]), (self.parts.x.parameter, self.parts.x.values[i])])
-            .collect()
+        let of_panel = self.panel_axes.iter().map(|a| a.parameter).zip(self.panels[panel].iter().copied());
+        of_panel.chain([(self.y.parameter, self.y.values[j]), (self.x.parameter, self.x.values[i])]).collect()
     }
 
     /// The point of a cell, in SI units, fixed values included.
     pub fn point(&self, cell: usize) -> Point {
         let (panel, i, j) = self.places(cell);
         let mut point = self.panel_point(&self.panels[panel]);
-        point.set(self.parts.y.parameter, self.parts.y.values[j]);
-        point.set(self.parts.x.parameter, self.parts.x.values[i]);
+        point.set(self.y.parameter, self.y.values[j]);
+        point.set(self.x.parameter, self.x.values[i]);
         self.perturbation.map_or(point, |perturbation| perturbation.of_inputs(point))
     }
 
     /// The same cells with a perturbed case each; sizes that the grid does not set are those of the profile.
     fn perturbed(&self, perturbation: Perturbation, profile: &Profile) -> Grid {
         let mut grid = Grid { perturbation: Some(perturbation), ..self.clone() };
-        let is_set =
-            |quantity| self.values(0).iter().chain(&self.parts.fixed).any(|(known, _)| known.quantity == quantity);
+        let is_set = |quantity| self.values(0).iter().chain(&self.fixed).any(|(known, _)| known.quantity == quantity);
         let frame = &profile.frame;
         for (quantity, size_m) in
             [(CaseQuantity::Length, frame.default_length_m), (CaseQuantity::Width, frame.default_width_m)]
@@ -270,17 +236,17 @@ impl Grid {
 
     /// The perturbations of the cells' inputs.
     pub fn perturbations(&self) -> Vec<Perturbation> {
-        let mut all = Perturbation::all(self.parts.category);
-        all.retain(|by| self.parts.style == CaseStyle::Plain || !by.is_of_geometry());
+        let mut all = Perturbation::all(self.category);
+        all.retain(|by| self.style == CaseStyle::Plain || !by.is_of_geometry());
         all
     }
 
     fn panel_point(&self, panel: &[f64]) -> Point {
         let mut point = Point::default();
-        for (parameter, value) in &self.parts.fixed {
+        for (parameter, value) in &self.fixed {
             point.set(parameter, *value);
         }
-        for (axis, value) in self.parts.panel_axes.iter().zip(panel) {
+        for (axis, value) in self.panel_axes.iter().zip(panel) {
             point.set(axis.parameter, *value);
         }
         point
@@ -289,9 +255,9 @@ impl Grid {
     /// The profile for sweeping the grid: the JRC's comparison sweep has its own rules.
     pub(crate) fn profile(&self, profile: &Profile) -> Profile {
         let mut profile = profile.clone();
-        if self.parts.style == CaseStyle::JrcComparison {
+        if self.style == CaseStyle::JrcComparison {
             profile.cchdm.abort_on_large_ttc = true;
-            let of = |cell| run_up(self.parts.style, &self.point(cell), profile.frame.dt_s);
+            let of = |cell| run_up(self.style, &self.point(cell), profile.frame.dt_s);
             let longest = (0..self.cell_count()).map(of).max().unwrap_or(0);
             profile.frame.time_cap_s += f64::from(longest) * profile.frame.dt_s;
         }
@@ -308,12 +274,12 @@ impl Grid {
         let ego_mps = value(CaseQuantity::EgoSpeed, 0.0);
         let other_mps = value(CaseQuantity::OtherSpeed, ego_mps);
         let lateral_mps = value(CaseQuantity::LateralSpeed, 0.0);
-        if self.parts.style == CaseStyle::Plain {
-            return point.plain_case(self.parts.category, profile)?.case(profile.frame.time_cap_s);
+        if self.style == CaseStyle::Plain {
+            return point.plain_case(self.category, profile)?.case(profile.frame.time_cap_s);
         }
-        Ok(match self.parts.category {
+        Ok(match self.category {
             Category::CutIn => {
-                jrc_case::cut_in(ego_mps, other_mps, lateral_mps, run_up(self.parts.style, &point, dt_s), dt_s)
+                jrc_case::cut_in(ego_mps, other_mps, lateral_mps, run_up(self.style, &point, dt_s), dt_s)
             }
             Category::Lvd => {
                 let (end, deceleration) = (value(CaseQuantity::EndSpeed, 0.0), value(CaseQuantity::Deceleration, 0.0));
@@ -332,7 +298,7 @@ impl Grid {
     pub fn gap_m(&self, cell: usize, model: ModelId, profile: &Profile) -> f64 {
         let point = self.point(cell);
         let ego_mps = point.get(CaseQuantity::EgoSpeed).unwrap_or(0.0);
-        if self.parts.native_gap {
+        if self.native_gap {
             return jrc_case::native_distance(profile, model, ego_mps);
         }
         let of_headway = point.get(CaseQuantity::Thw).map(|thw_s| thw_s * ego_mps);
@@ -344,8 +310,7 @@ impl Grid {
         let point = self.point(cell);
         let ego_mps = point.get(CaseQuantity::EgoSpeed).unwrap_or(0.0);
         let other_mps = point.get(CaseQuantity::OtherSpeed).unwrap_or(ego_mps);
-        let of_run_up =
-            jrc_case::gap_before_run_up(0.0, ego_mps, other_mps, run_up(self.parts.style, &point, dt_s), dt_s);
+        let of_run_up = jrc_case::gap_before_run_up(0.0, ego_mps, other_mps, run_up(self.style, &point, dt_s), dt_s);
         of_run_up + self.perturbation.map_or(0.0, Perturbation::gap_m)
     }
 }
@@ -365,16 +330,16 @@ fn run_up(style: CaseStyle, point: &Point, dt_s: f64) -> u32 {
 fn check_complete(category: Category, native_gap: bool, has: &dyn Fn(CaseQuantity) -> bool) -> Result<()> {
     let missing = |what: &str, example: &str| {
         let problem = format!("a map of {}s needs {what}", category.label());
-        let help = format!("give it by option `x`, option `y`, option `panel` or option `set` {example}");
+        let help =
+            format!("give it by {}, {}, {} or {} {example}", option("x"), option("y"), option("panel"), option("set"));
         Err(Error::usage(Place::item(what), problem, help))
     };
     let has_gap = has(CaseQuantity::Gap) || has(CaseQuantity::Thw);
-    let has_parameter = |key: &str| NUMBERS.iter().any(|number| number.key == key && has(number.quantity));
-    match missing_parameter(category, has_parameter) {
+    match CaseQuantity::needed(category).iter().find(|needed| !has(**needed)) {
         None => {}
-        Some("ego_speed") => return missing("the ego's speed", "ego_speed_kmh=60"),
-        Some("lateral_speed") => return missing("the lateral speed", "lateral_speed_mps=1"),
-        Some("acceleration") => return missing("the leader's deceleration", "deceleration_mps2=6"),
+        Some(CaseQuantity::EgoSpeed) => return missing("the ego's speed", "ego_speed_kmh=60"),
+        Some(CaseQuantity::LateralSpeed) => return missing("the lateral speed", "lateral_speed_mps=1"),
+        Some(CaseQuantity::Deceleration) => return missing("the leader's deceleration", "deceleration_mps2=6"),
         Some(_) => return missing("the gap to the vehicle ahead", "ahead_gap_m=50"),
     }
     if has(CaseQuantity::Gap) && has(CaseQuantity::Thw) || native_gap && has_gap {

@@ -6,7 +6,7 @@ use lanesweep_model::plausibility::{Doubts, HELP, Quantity};
 use lanesweep_model::profile::Profile;
 use lanesweep_model::scenario::{CaseNumber, CaseQuantity, Category, LANE_WIDTH_M, NUMBERS, PlainCase, check_headway};
 use lanesweep_support::plain_text::nearest;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// A parameter as named in flags, tables and files.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,7 +83,7 @@ impl MapParameter {
     ///
     /// # Errors
     /// [`Error::Usage`] that names both.
-    pub fn refuse_repeats(given: &[&MapParameter]) -> Result<()> {
+    pub(crate) fn refuse_repeats(given: &[&MapParameter]) -> Result<()> {
         for (at, parameter) in given.iter().enumerate() {
             if let Some(before) = given[..at].iter().find(|p| p.quantity == parameter.quantity) {
                 let problem = format!("`{}` and `{}` say the same twice", before.key, parameter.key);
@@ -107,7 +107,7 @@ impl MapParameter {
     ///
     /// # Errors
     /// [`Error::Usage`] for a value beyond the physical range, unless such values are accepted.
-    pub fn check_plausible(&self, value: f64, doubts: &mut Doubts) -> Result<()> {
+    pub(crate) fn check_plausible(&self, value: f64, doubts: &mut Doubts) -> Result<()> {
         let Some(plausible) = self.quantity.number().plausible else { return Ok(()) };
         let si = match self.quantity {
             _ if self.is_relative => self.si(value).abs(),
@@ -115,7 +115,7 @@ impl MapParameter {
             _ => self.si(value),
         };
         let checked = doubts.check(plausible, si, || self.key.to_owned());
-        checked.map_err(|problem| Error::usage(Place::item(self.key), problem, HELP))
+        checked.map_err(|problem| Error::usage(Place::item(self.key), problem, HELP.as_str()))
     }
 
     /// Checks the range of a value. A speed that is noise of a stationary vehicle becomes 0, with a warning.
@@ -190,37 +190,22 @@ impl Point {
     /// # Errors
     /// [`Error::Usage`] for a time headway of a stationary ego.
     pub fn plain_case(&self, category: Category, profile: &Profile) -> Result<PlainCase> {
-        let value = |quantity, otherwise: f64| self.get(quantity).unwrap_or(otherwise);
-        let ego_speed_mps = value(CaseQuantity::EgoSpeed, 0.0);
-        let deceleration = value(CaseQuantity::Deceleration, 0.0);
-        check_headway(ego_speed_mps, self.get(CaseQuantity::Thw))?;
-        let speed_mps = value(CaseQuantity::OtherSpeed, ego_speed_mps);
+        let frame = &profile.frame;
+        let case = PlainCase::of(category, &|of| self.get(of), frame.default_length_m, frame.default_width_m);
+        let deceleration = self.get(CaseQuantity::Deceleration).unwrap_or(0.0);
+        check_headway(case.ego_speed_mps, self.get(CaseQuantity::Thw))?;
+        let speed_mps = case.speed_mps;
         if speed_mps < 0.0 {
             let problem = format!("the other vehicle would drive backwards, at {speed_mps} m/s");
-            let help = "give relative speeds of at least minus the ego's speed; a map leaves such panels out, where both \
-                        speeds belong to the panels (name other axes by option `x` and option `y`)";
+            let help = format!(
+                "give relative speeds of at least minus the ego's speed; a map leaves such panels out, where both \
+                        speeds belong to the panels (name other axes by {} and {})",
+                option("x"),
+                option("y")
+            );
             return Err(Error::usage(Place::item("relative_speed"), problem, help));
         }
-        let length_m = value(CaseQuantity::Length, profile.frame.default_length_m);
-        let width_m = value(CaseQuantity::Width, profile.frame.default_width_m);
-        let lane_width_m = value(CaseQuantity::LaneWidth, LANE_WIDTH_M);
-        Ok(PlainCase {
-            category,
-            ego_speed_mps,
-            speed_mps,
-            // Avoids a negative zero.
-            acceleration_mps2: if deceleration > 0.0 { -deceleration } else { 0.0 },
-            end_speed_mps: self.get(CaseQuantity::EndSpeed),
-            lateral_speed_mps: value(CaseQuantity::LateralSpeed, 0.0),
-            lateral_distance_m: value(CaseQuantity::LateralDistance, lane_width_m),
-            ahead_speed_mps: value(CaseQuantity::AheadSpeed, 0.0),
-            ahead_gap_m: value(CaseQuantity::AheadGap, 0.0),
-            length_m,
-            width_m,
-            ego_length_m: value(CaseQuantity::EgoLength, length_m),
-            ego_width_m: value(CaseQuantity::EgoWidth, width_m),
-            lane_width_m,
-            duration_s: None,
-        })
+        // Avoids a negative zero.
+        Ok(PlainCase { acceleration_mps2: if deceleration > 0.0 { -deceleration } else { 0.0 }, ..case })
     }
 }

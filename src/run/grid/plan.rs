@@ -55,7 +55,7 @@ impl GridPlan {
     pub fn new(grid: Grid, profile: &Profile, models: &[ModelId]) -> Result<GridPlan> {
         let profile = grid.profile(profile);
         let mut groups: Vec<Vec<ModelId>> = Vec::new();
-        if grid.has_native_gap() {
+        if grid.native_gap {
             // Models with the same distance at two speeds share a plan.
             let distances = |model| [0.0, 40.0].map(|v| jrc_case::native_distance(&profile, model, v));
             for &model in models {
@@ -99,17 +99,17 @@ impl GridPlan {
 
 impl GridPart {
     fn new(grid: &Grid, profile: &Profile, models: Vec<ModelId>) -> Result<GridPart> {
-        let layout = if is_distance(grid.x().parameter) {
+        let layout = if is_distance(grid.x.parameter) {
             Layout::HeadwaysAcross
-        } else if is_distance(grid.y().parameter) {
+        } else if is_distance(grid.y.parameter) {
             Layout::HeadwaysUp
         } else {
             Layout::Cells
         };
-        let fixed = grid.fixed().iter().find(|(parameter, _)| is_distance(parameter));
+        let fixed = grid.fixed.iter().find(|(parameter, _)| is_distance(parameter));
         let headways = match (layout, fixed) {
-            (Layout::HeadwaysAcross, _) => headways(grid.x()),
-            (Layout::HeadwaysUp, _) => headways(grid.y()),
+            (Layout::HeadwaysAcross, _) => headways(&grid.x),
+            (Layout::HeadwaysUp, _) => headways(&grid.y),
             (Layout::Cells, Some((parameter, value))) => vec![headway(parameter, *value)],
             (Layout::Cells, None) => vec![Headway::GapM(0.0)],
         };
@@ -132,7 +132,7 @@ impl GridPart {
                 values.map(|(parameter, value)| format!("{}={value}", parameter.key)).collect::<Vec<_>>().join(","),
             );
         }
-        let block = Block::new(grid.category(), names.into_iter().collect(), vec![VARIANT.to_owned()]);
+        let block = Block::new(grid.category, names.into_iter().collect(), vec![VARIANT.to_owned()]);
         let source = Arc::new(source);
         let plan = |profile: Profile, models, headways, block| {
             LanePlan::new(profile, models, headways, vec![block], source.clone())
@@ -149,7 +149,7 @@ impl GridPart {
 
 impl Layout {
     fn cell(self, grid: &Grid, unit: usize, headway: usize) -> usize {
-        let (nx, ny) = (grid.x().len(), grid.y().len());
+        let (nx, ny) = (grid.x.len(), grid.y.len());
         match self {
             Layout::Cells => unit,
             Layout::HeadwaysAcross => grid.cell(unit / ny, headway, unit % ny),

@@ -10,7 +10,7 @@ use super::Shard;
 use super::ledger::MergeableCounts;
 use super::sealed::{read_sealed, seal};
 use lanesweep_support::files::write_inside;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Maximum number of parts listed by name in an error.
 const NAMED: usize = 10;
@@ -154,53 +154,12 @@ pub fn read_part<T: MergeableCounts>(
     let (part, _): (Part<T>, _) = read_sealed("part", path, MAX_BYTES, &redo)?;
     let wrong = |problem: String, help: &str| Error::input(Place::file(path), problem, help);
     if part.run_sha256 != run_sha256 {
-        let help = "use one folder per run: move it away, or give another option `out`";
-        return Err(wrong("it is foreign: it belongs to another run than plan.json in this folder".to_owned(), help));
+        let help = format!("use one folder per run: move it away, or give another {}", option("out"));
+        return Err(wrong("it is foreign: it belongs to another run than plan.json in this folder".to_owned(), &help));
     }
     if part.units != *units {
         let problem = format!("it holds units {:?}, its name stands for {units:?}", part.units);
         return Err(wrong(problem, &redo));
     }
     Ok(part)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn folder(names: &[&str]) -> tempfile::TempDir {
-        let dir = tempfile::tempdir().unwrap();
-        for name in names {
-            std::fs::write(dir.path().join(name), "").unwrap();
-        }
-        dir
-    }
-
-    fn problem_of(names: &[&str], units: u64) -> String {
-        let dir = folder(names);
-        let error = collect(dir.path(), units, |shard| format!("make {shard}")).unwrap_err();
-        format!("{error} {}", error.help().unwrap_or_default())
-    }
-
-    #[test]
-    fn missing_doubled_and_misnamed_parts_are_told_with_what_to_do() {
-        let missing = problem_of(&["part-00000-of-00003.json"], 9);
-        assert!(missing.contains("6 of 9 units are missing") && missing.contains("make 1/3\nmake 2/3"), "{missing}");
-        let doubled = problem_of(&["part-00000-of-00003.json", "part-00000-of-00001.json"], 9);
-        assert!(doubled.contains("units 0 to 2 are doubled"), "{doubled}");
-        assert!(problem_of(&["part-3.json"], 9).contains("no part"));
-        assert!(problem_of(&["estimate.json"], 9).contains("there is no part here"));
-        let mixed = problem_of(&["part-00000-of-00003.json", "part-00002-of-00004.json"], 12);
-        assert!(mixed.contains("units 4..6, 9..12"), "{mixed}");
-    }
-
-    #[test]
-    fn parts_of_different_numbers_of_shards_may_make_a_whole() {
-        let dir = folder(&["part-00000-of-00002.json", "part-00002-of-00004.json", "part-00003-of-00004.json"]);
-        let found = collect(dir.path(), 8, |_| String::new()).unwrap();
-        assert_eq!(found.len(), 3);
-        // More shards than units: the empty ones may be missing.
-        let dir = folder(&["part-00001-of-00002.json"]);
-        assert!(collect(dir.path(), 1, |_| String::new()).is_ok());
-    }
 }

@@ -5,9 +5,8 @@ use std::io::{BufRead, BufReader, ErrorKind, Read, Seek, Write};
 use std::path::Path;
 
 use lanesweep_support::files::write_inside;
-use lanesweep_support::input_file;
 use lanesweep_support::run_folder::RunFolder;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, input_file, option};
 
 /// File name of the plan in a run's folder.
 pub const PLAN_FILE: &str = "plan.json";
@@ -29,8 +28,11 @@ pub(crate) fn leave_plan(out: &Path, line: &[u8], write: impl Fn(&mut dyn Write)
         Ok(mut there) => {
             let mut begin = vec![0; line.len()];
             if there.read_exact(&mut begin).is_err() || begin != line {
-                let help = "give another option `out`, or the flags that the plan was made with; or move the plan and \
-                            its parts away";
+                let help = format!(
+                    "give another {}, or the flags that the plan was made with; or move the plan and \
+                            its parts away",
+                    option("out")
+                );
                 return Err(Error::input(Place::file(&path), "this folder holds the plan of another run", help));
             }
             there.rewind().map_err(io)?;

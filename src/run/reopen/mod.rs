@@ -12,8 +12,8 @@ use std::path::Path;
 pub use traced::{TracedCase, TracedLane, TracedLanes};
 
 use crate::parts::{PLAN_FILE, kind_of};
-use crate::sampling::{Sample, SampleKind};
-use crate::study::{Study, StudyOptions, plan_study};
+use crate::sampling::{ESTIMATE_RECORD, Sample, SampleKind};
+use crate::study::{STUDY_RECORD, Study, StudyOptions, plan_study};
 use lanesweep_engine::{Headway, LaneKey, LanePlan};
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::profile::Profile;
@@ -21,8 +21,7 @@ use lanesweep_model::scenario::Scenario;
 use lanesweep_stats::density::DensityModel;
 use lanesweep_support::files::check_run_folder;
 use lanesweep_support::ranges::refuse_repeats;
-use lanesweep_support::run_folder::{ESTIMATE_RECORD, STUDY_RECORD};
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Lanes that can be rerun.
 pub struct Reopened {
@@ -60,7 +59,7 @@ impl Reopened {
         }
         let plan = dir.join(PLAN_FILE);
         if !plan.exists() {
-            let help = "give the folder (option `out`) of a `lanesweep study` or `lanesweep sample`";
+            let help = format!("give the folder ({}) of a `lanesweep study` or `lanesweep sample`", option("out"));
             return Err(Error::input(Place::file(dir), "there is no run here", help));
         }
         match kind_of(&plan)?.as_str() {

@@ -6,15 +6,14 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use crate::parts::{PLAN_FILE, RUN_PLAN_FILE, kind_of};
-use crate::sampling::{Estimator, SampleHeadways, SampleOptions, plan_samples};
-use crate::study::Study;
+use crate::sampling::{ESTIMATE_RECORD, Estimator, SampleHeadways, SampleOptions, plan_samples};
+use crate::study::{STUDY_RECORD, Study};
 use lanesweep_engine::{ENGINE_VERSION, Headway, LanePlan};
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::profile::Profile;
 use lanesweep_stats::density::{DensityModel, read_density};
 use lanesweep_support::input_file::{MAX_TABLE_BYTES, read_json};
-use lanesweep_support::run_folder::{ESTIMATE_RECORD, STUDY_RECORD};
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Crude Monte Carlo of a folder: the plan, remade from the density beside the record, and the density.
 pub(super) fn sample_of(dir: &Path) -> Result<(LanePlan, DensityModel)> {
@@ -33,7 +32,10 @@ pub(super) fn sample_of(dir: &Path) -> Result<(LanePlan, DensityModel)> {
     }
     let (path, density_path) = (&dir.join(ESTIMATE_RECORD), &dir.join("density.json"));
     let wrong = |problem: String| {
-        let help = "give the folder (option `out`) of a `lanesweep sample` run of crude Monte Carlo by this version";
+        let help = format!(
+            "give the folder ({}) of a `lanesweep sample` run of crude Monte Carlo by this version",
+            option("out")
+        );
         Error::input(Place::file(path), problem, help)
     };
     let text =
@@ -93,8 +95,11 @@ pub(super) fn study_of(dir: &Path) -> Result<Study> {
     }
     let run = &dir.join(STUDY_RECORD);
     let wrong = |problem: String| {
-        let help = "make the plan again with the study's own command and option `plan_only`, into this folder; a study \
-                    keeps it up to 256 MiB, and always with `study.keep_plan=always`";
+        let help = format!(
+            "make the plan again with the study's own command and {}, into this folder; a study \
+                    keeps it up to 256 MiB, and always with `study.keep_plan=always`",
+            option("plan_only")
+        );
         Error::input(Place::file(run), problem, help)
     };
     let text = read_json(run, MAX_TABLE_BYTES, "the record of a study", "run the study into this folder again")?;

@@ -3,10 +3,9 @@
 //! the parameterization itself is visible only in this comparison.
 
 use rayon::prelude::*;
-use serde::Serialize;
 
 use super::Sample;
-use super::estimate_rows::{EstimateRow, RecordedRatios};
+use super::estimate_rows::{EstimateRow, NoTraffic, RecordedRatios};
 use super::plan::{plan_draws, plan_points};
 use super::result::SampleResult;
 use super::sample_options::SampleHeadways;
@@ -71,19 +70,9 @@ fn verdicts(plan: &LanePlan) -> Result<Vec<Verdicts>> {
 pub const TRAFFIC_DRAWS: u64 = 20_000;
 const PURPOSE: u32 = 0x7261_6666;
 
-/// What draws without possible traffic are of an estimate: the vehicle that cuts out drives through the one ahead of it. Maps and
-/// tables of cases leave them out by the same rule.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct NoTraffic {
-    /// Their fraction of the draws.
-    pub fraction: f64,
-    /// The probability that a draw with possible traffic fails.
-    pub possible_probability: f64,
-}
-
 impl Sample {
-    /// Adds the rates of the recorded scenarios to the result, and what draws without possible traffic are of it. Adds a warning if the rates differ, if there are too few
-    /// failures, or if the density does not contain its scenarios.
+    /// Adds the rates of the recorded scenarios to the result, and what draws without possible traffic are of it. Adds a
+    /// warning if the rates differ, if there are too few failures, or if the density does not contain its scenarios.
     ///
     /// # Errors
     /// Those of the lanes of S and S'.

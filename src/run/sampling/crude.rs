@@ -13,7 +13,7 @@ use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::ModelId;
 use lanesweep_stats::density::Exposure;
 use lanesweep_stats::estimate::{StopReason, StopRule, next_checkpoint};
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Estimates after a number of samples.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -77,7 +77,11 @@ pub(super) fn sample_into(
     let is_whole = range == (0..plan.unit_count());
     if !is_whole && !options.stop.is_fixed() {
         let problem = "a part of a run cannot tell when the whole is good enough";
-        return Err(Error::usage(Place::option("shard"), problem, "leave the stop rules out, or option `shard`"));
+        return Err(Error::usage(
+            Place::option("shard"),
+            problem,
+            format!("leave the stop rules out, or {}", option("shard")),
+        ));
     }
     let wanted = if each.is_some() { Wanted::Outcomes } else { Wanted::Counts };
     let mut tally = SampleTally::empty(plan);

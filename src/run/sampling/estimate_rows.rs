@@ -3,7 +3,6 @@
 
 use serde::Serialize;
 
-use super::against_recorded::NoTraffic;
 use super::sample_options::SampleOptions;
 use super::uncertainty::Uncertainty;
 use lanesweep_engine::{LanePlan, SampleTally, cell_of};
@@ -13,6 +12,16 @@ use lanesweep_stats::density::{Exposure, Rate, normal_quantile};
 use lanesweep_stats::estimate::{
     Clusters, Counts, Estimate, Interval, Ratio, StopReason, Warning, cluster_rate, from_clusters, from_counts,
 };
+
+/// What draws without possible traffic are of an estimate: the vehicle that cuts out drives through the one ahead of it. Maps and
+/// tables of cases leave them out by the same rule.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct NoTraffic {
+    /// Their fraction of the draws.
+    pub fraction: f64,
+    /// The probability that a draw with possible traffic fails.
+    pub possible_probability: f64,
+}
 
 /// An estimate with its model, criterion and headway.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -58,6 +67,28 @@ impl EstimateRow {
     /// Whether the row is over all headways, if there are several.
     pub fn is_overall(&self, all: &[EstimateRow]) -> bool {
         self.headway == "all" || !all.iter().any(|row| row.headway == "all")
+    }
+
+    /// Whether it is told: P over all headways, and rare failures by importance sampling.
+    pub fn is_told(&self, all: &[EstimateRow]) -> bool {
+        self.is_overall(all) || self.is_rare_beside(all)
+    }
+
+    /// Whether P is below one in the kernels: it comes from the tails of the density's kernels, not from data.
+    pub fn is_of_tails(&self, kernels: usize) -> bool {
+        self.estimate.probability * (kernels as f64) < 1.0
+    }
+
+    /// How many times the lanes of crude Monte Carlo its weights cost for the same interval; `None` if they saved some.
+    pub fn times_crude(&self) -> Option<f64> {
+        let reduction = self.estimate.variance_reduction;
+        (self.estimate.weights.is_some() && reduction < 1.0).then(|| 1.0 / reduction)
+    }
+
+    /// Why the run of these rows ended: the time limit tells more than the number of samples.
+    pub fn stopped(all: &[EstimateRow]) -> StopReason {
+        let stopped = all.iter().map(|row| row.estimate.stopped).max_by_key(|s| *s == StopReason::TimeLimit);
+        stopped.unwrap_or(StopReason::Samples)
     }
 
     /// A row whose interval covers the draws alone.
@@ -213,29 +244,5 @@ impl Risk {
             per_hour: product(exposure.and_then(|e| e.per_hour.as_ref()), 1.0),
             per_1000_km: product(exposure.and_then(|e| e.per_kilometre.as_ref()), 1000.0),
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use lanesweep_model::scenario::Driven;
-    use lanesweep_stats::estimate::{BinomialInterval, Counts, StopReason, from_counts};
-
-    #[test]
-    fn risk_without_failures_is_bounded_and_not_zero() {
-        let exposure = Exposure::new(100, Driven { hours: Some(50.0), kilometres: Some(5000.0) });
-        let counts = |failures| Counts { runs: 10_000, failures, voids: 0, tries: 10_000 };
-        let of = |failures| {
-            let estimate = from_counts(&counts(failures), BinomialInterval::Wilson, 0.95, StopReason::Samples);
-            Risk::of(&estimate, Some(&exposure)).per_hour.unwrap()
-        };
-        let none = of(0);
-        assert!(none.estimate == 0.0 && none.high > 2.0 * 2.9e-4 && none.high < 3.0 * 3.0e-4);
-        let some = of(100);
-        // 10 % error of the events and 10 % of the failures.
-        assert!((some.estimate - 0.02).abs() < 1e-12);
-        assert!((some.standard_deviation / some.estimate - 0.141).abs() < 2e-3);
-        assert!(some.low < some.estimate && some.high > some.estimate);
     }
 }

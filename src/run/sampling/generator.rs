@@ -11,7 +11,7 @@ use lanesweep_model::scenario::Category;
 use lanesweep_model::scenario::parameterization::{AfterDuration, ReducedSeries, Sizes, Variable};
 use lanesweep_random::Stream;
 use lanesweep_stats::density::{Kde, ParameterSpace};
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Purpose of the random stream of the samples.
 pub const SAMPLE_PURPOSE: u32 = 0x5341_4d50;
@@ -75,7 +75,10 @@ fn assembled(space: &ParameterSpace, points: Points, sizes: &Sizes, profile: &Pr
         return Err(Error::usage(
             Place::item(format!("profile {}", profile.name)),
             "its cut-outs begin at the exposure of the vehicle ahead, which sampled lanes do not follow",
-            "use a profile with cut_out_target = \"nearest-unsafe\", for instance option `profile = paper`",
+            format!(
+                "use a profile with cut_out_target = \"nearest-unsafe\", for instance {}",
+                option("profile = paper")
+            ),
         ));
     }
     let recipe = recipe(space, sizes, profile)?;

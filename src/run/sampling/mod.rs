@@ -19,10 +19,10 @@ mod sample_run;
 mod uncertainty;
 mod weighted;
 
-pub use against_recorded::{NoTraffic, TRAFFIC_DRAWS};
+pub use against_recorded::TRAFFIC_DRAWS;
 pub use cheaper_estimator::Choice;
 pub use crude::{Checkpoint, CheckpointRow, CrudeRun};
-pub use estimate_rows::{EstimateRow, RecordedRatios, Risk, RiskRate};
+pub use estimate_rows::{EstimateRow, NoTraffic, RecordedRatios, Risk, RiskRate};
 pub use failing_lanes::FailingLane;
 pub use generator::{SAMPLE_PURPOSE, generator_of, generator_of_points};
 pub use limit_state::{LaneLimitState, limit_state, truncated};
@@ -31,7 +31,7 @@ use plan_file::{KIND, SEARCH_FILE};
 pub use proposal_file::{proposal_from_text, proposal_text, read_proposal};
 pub use result::SampleResult;
 pub use sample_options::{Estimator, Question, SampleHeadways, SampleOptions};
-pub use sample_run::{CrudeJob, SampleJob, WeightedJob};
+pub use sample_run::{CrudeJob, ESTIMATE_RECORD, SampleJob, WeightedJob};
 pub use uncertainty::Uncertainty;
 pub use weighted::WeightedTally;
 

@@ -8,7 +8,7 @@ use lanesweep_model::driver::ModelId;
 use lanesweep_model::profile::Profile;
 use lanesweep_random::Stream;
 use lanesweep_stats::density::DensityModel;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 use super::generator::{SAMPLE_PURPOSE, generator_of, generator_of_points};
 use super::sample_options::{SampleHeadways, SampleOptions};
@@ -73,21 +73,21 @@ fn plan(
             return Err(Error::usage(
                 Place::option("thw"),
                 "this density has no parameter `thw_s`, so observed headways cannot be drawn from it",
-                "fit it with option `with_thw`, or give a headway in seconds",
+                format!("fit it with {}, or give a headway in seconds", option("with_thw")),
             ));
         }
         (SampleHeadways::Each(_), true) => {
             return Err(Error::usage(
                 Place::option("thw"),
                 "this density draws the headway itself (parameter `thw_s`)",
-                "use option `thw = sampled`, or fit it without option `with_thw`",
+                format!("use {}, or fit it without {}", option("thw = sampled"), option("with_thw")),
             ));
         }
         (SampleHeadways::Each(list), false) if Headway::is_observed(list) => {
             return Err(Error::usage(
                 Place::option("thw"),
                 "this density has no observed headways (parameter `thw_s`)",
-                "fit it with option `with_thw`, or give a headway in seconds",
+                format!("fit it with {}, or give a headway in seconds", option("with_thw")),
             ));
         }
         (SampleHeadways::Each(list), false) => list.clone(),

@@ -15,7 +15,7 @@ use lanesweep_stats::density::DensityModel;
 use lanesweep_stats::estimate::{Importance, SearchRun};
 use lanesweep_support::atomic_file::refuse_link;
 use lanesweep_support::files::{make_folder, write_inside};
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// File of a run with its own search; kept until the run ends.
 pub(super) const SEARCH_FILE: &str = "search.json";
@@ -23,7 +23,7 @@ pub(super) const SEARCH_FILE: &str = "search.json";
 pub(crate) const KIND: &str = "sampling plan";
 /// Maximum size of a plan that is read, bytes: mostly the density.
 const MAX_PLAN_BYTES: u64 = 1 << 30;
-const HOW_TO_REMAKE: &str = "make it by `sample` of this version, with option `plan_only`";
+const HOW_TO_REMAKE: &str = "make it by `sample --plan-only` of this version";
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -117,7 +117,11 @@ impl Sample {
         // Whoever writes a plan checks what it replaces.
         if !is_plan && !kind_of(path).is_ok_and(|kind| kind == KIND) {
             let problem = "it would be overwritten, and it is not the search of an interrupted run";
-            return Err(Error::usage(Place::file(path), problem, "move it away, or give another option `out`"));
+            return Err(Error::usage(
+                Place::file(path),
+                problem,
+                format!("move it away, or give another {}", option("out")),
+            ));
         }
         let Ok(kept) = Sample::read(path) else { return Ok(None) };
         let SampleKind::Weighted(weighted) = &kept.kind else { return Ok(None) };

@@ -6,12 +6,11 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use lanesweep_stats::density::{DensityModel, MAX_FILE_BYTES, Mixture};
-use lanesweep_support::input_file;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, input_file};
 
 const VERSION: u64 = 1;
 
-const HOW_TO_REMAKE: &str = "write it again by `sample`, with option `estimator = is`";
+const HOW_TO_REMAKE: &str = "write it again by `sample --estimator is`";
 
 /// The mixture of a proposal over the parameters of a density.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

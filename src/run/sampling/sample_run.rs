@@ -12,8 +12,10 @@ use crate::parts::{Computed, EachChunk, Job, Ledger, MergeableCounts, PLAN_FILE,
 use lanesweep_engine::{Executor, LanePlan, SampleTally, SweepSummary};
 use lanesweep_stats::density::Exposure;
 use lanesweep_support::files::remove_file;
-use lanesweep_support::run_folder::ESTIMATE_RECORD;
 use lanesweep_support::{Error, Place, Result};
+
+/// Record of a sampling run.
+pub const ESTIMATE_RECORD: &str = "estimate.json";
 
 /// Evaluates an expression for the job of a planned sample.
 macro_rules! with_job {

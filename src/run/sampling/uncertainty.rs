@@ -37,22 +37,3 @@ impl Uncertainty {
         })
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn parts_sum_to_one_and_the_factors_halve_the_width() {
-        let of = Uncertainty::new([0.0001, 0.02, 0.003]).unwrap();
-        assert!((of.draws + of.scenarios + of.exposure - 1.0).abs() < 1e-12);
-        let factor = of.hours_factor.unwrap();
-        let after = of.draws + (of.scenarios + of.exposure) / factor;
-        assert!((after - 0.25).abs() < 1e-12, "{after}");
-        assert_eq!(of.samples_factor, None, "the recordings alone are wider");
-        let of = Uncertainty::new([0.02, 0.0001, 0.0]).unwrap();
-        assert!((of.draws / of.samples_factor.unwrap() + of.scenarios - 0.25).abs() < 1e-12);
-        assert_eq!(Uncertainty::new([f64::NAN, 0.0, 0.0]), None);
-        assert_eq!(Uncertainty::new([0.0; 3]), None);
-    }
-}

@@ -61,18 +61,3 @@ impl HeadwayFailures {
         })
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn failures_by_headway_are_as_many_as_the_lanes_they_count_or_an_error() {
-        let (variants, headways) = (["S".to_owned()], [Headway::ThwS(1.0), Headway::ThwS(0.5)]);
-        let of = |counts: u64| HeadwayFailures::new(&variants, &headways, &[ModelId::Fsm], (0..counts).collect());
-        assert_eq!(of(6).unwrap().count((0, 1, 0, Criterion::Btn)), 5);
-        for wrong in [0, 5, 7] {
-            assert!(matches!(of(wrong), Err(Error::Internal(_))), "{wrong} counts");
-        }
-    }
-}

@@ -76,25 +76,3 @@ pub fn pareto_front(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     }
     front
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn points_of_equal_f1_have_that_f1_and_lie_in_the_square() {
-        for f in [0.2, 0.5, 0.8] {
-            for (r, p) in equal_f1(f) {
-                assert!((0.0..=1.0 + 1e-12).contains(&r) && (0.0..=1.0).contains(&p));
-                assert!((2.0 * r * p / (r + p) - f).abs() < 1e-12);
-            }
-        }
-    }
-
-    #[test]
-    fn nothing_on_the_front_is_beaten_by_as_few_parameters() {
-        let points = [(3.0, 0.5), (4.0, 0.4), (2.0, 0.3), (3.0, 0.6), (5.0, 0.6), (7.0, 0.9)];
-        assert_eq!(pareto_front(&points), [(2.0, 0.3), (3.0, 0.6), (7.0, 0.9)]);
-        assert!(pareto_front(&[]).is_empty());
-    }
-}

@@ -31,8 +31,7 @@ use lanesweep_engine::{Confusion, Headway, LanePlan, Partial, UnitCounts};
 use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::scenario::Category;
-use lanesweep_support::ranges;
-use lanesweep_support::{Error, Place, Result, settings};
+use lanesweep_support::{Error, Place, Result, ranges, settings};
 
 /// Ending of the name of a parameterization that replays each scenario by a basis that has not seen it.
 pub const CROSS_VALIDATED: &str = "-cv";
@@ -251,38 +250,5 @@ impl ScoreOptions {
     /// Checks the ranges; the error names the option.
     pub fn validate(&self) -> Result<()> {
         ranges::check("score", self)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_confusion_by_hand() {
-        let c = Confusion { tp: 6, fn_: 2, fp: 4, tn: 88 };
-        assert_eq!(recall(&c), Some(0.75));
-        assert_eq!(precision(&c), Some(0.6));
-        assert_eq!(f1(&c), Some(12.0 / 18.0));
-    }
-
-    #[test]
-    fn counts_past_2_to_the_32_score_as_their_shares_do() {
-        let c = Confusion { tp: 6 << 40, fn_: 2 << 40, fp: 4 << 40, tn: 88 << 40 };
-        assert_eq!((recall(&c), precision(&c), f1(&c)), (Some(0.75), Some(0.6), Some(12.0 / 18.0)));
-        let max = Confusion { tp: u64::MAX, ..Confusion::default() };
-        assert_eq!(f1(&max), Some(1.0));
-    }
-
-    #[test]
-    fn where_nothing_ever_fails_there_is_no_score() {
-        let c = Confusion { tn: 100, ..Confusion::default() };
-        assert_eq!((recall(&c), precision(&c), f1(&c)), (None, None, None));
-    }
-
-    #[test]
-    fn a_parameterization_that_misses_every_failure_scores_0_and_has_no_precision() {
-        let c = Confusion { fn_: 3, tn: 7, ..Confusion::default() };
-        assert_eq!((recall(&c), precision(&c), f1(&c)), (Some(0.0), None, Some(0.0)));
     }
 }

@@ -143,35 +143,3 @@ impl Statistic {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_excess_of_errors_is_the_difference_of_their_shares() {
-        let counts = Confusion { tp: 3, fn_: 1, fp: 5, tn: 1 };
-        let variants = ["S", "c"].map(str::to_owned).to_vec();
-        let cells =
-            vec![Confusion { tp: 4, tn: 6, ..Confusion::default() }, Confusion::default(), Confusion::default()];
-        let scores = CategoryScores {
-            category: lanesweep_model::scenario::Category::CutOut,
-            scenarios: 20,
-            simulations: 200,
-            variants,
-            models: vec![ModelId::Fsm],
-            cells: Vec::new(),
-            capped: Vec::new(),
-        };
-        let cells: Vec<_> = cells.into_iter().chain([counts; 3]).collect();
-        let units: Vec<_> = (0..20).map(|unit| UnitCounts { unit, cells: cells.clone(), capped: vec![] }).collect();
-        let of = Scenarios { scores: &scores, units: &units };
-        let cell = (ModelId::Fsm, Criterion::Collision);
-        let value = |statistic: Statistic| statistic.value(of, cell, 0.95).unwrap().0;
-        assert!((value(Statistic::FalsePositivesDominate(&["c"])) - 4.0 / 12.0).abs() < 1e-12);
-        assert!((value(Statistic::FalseNegativesDominate(&["c"])) + 4.0 / 12.0).abs() < 1e-12);
-        assert!((value(Statistic::F1Below("c", 0.1)) - (0.1 - 0.5)).abs() < 1e-12);
-        assert_eq!((of.failing(&[cell]), of.failing(&[(ModelId::Fsm, Criterion::Btn)])), (20, 0));
-        assert_eq!(Statistic::F1Below("a", 0.1).value(of, cell, 0.95), None, "a was not run");
-    }
-}

@@ -91,34 +91,38 @@ impl ExternalReplay {
             });
             replay.scenarios.insert(own.id, reduced);
         }
-        for replay in replays.values().filter(|replay| categories.contains(&replay.category)) {
-            let missing = scenarios
-                .iter()
-                .find(|s| s.kept && s.category == replay.category && !replay.scenarios.contains_key(&s.id));
-            if let Some(missing) = missing {
-                let problem = format!("scenario {} is missing; others of its category are there", missing.id);
-                return Err(Error::input(place(), problem, "give all kept scenarios of a category, or none"));
-            }
-            // Rows that were shifted or sorted have the ids of other scenarios.
-            let pairs: Vec<_> = scenarios.iter().filter_map(|s| Some((s, replay.scenarios.get(&s.id)?))).collect();
-            let difference = |(s, own): (&Scenario, &ReducedScenario)| {
-                let ends = [(s.target.v.first(), own.v.first()), (s.target.v.last(), own.v.last())];
-                ends.iter().map(|(a, b)| (a.unwrap_or(&0.0) - b.unwrap_or(&0.0)).abs()).sum::<f64>()
-            };
-            let is_nearer = |(pair, next): &(_, &(&Scenario, _))| difference(*pair) <= difference((next.0, pair.1));
-            let next = pairs.iter().cycle().skip(1);
-            let near = pairs.iter().copied().zip(next).filter(is_nearer).count();
-            if pairs.len() >= 4 && 4 * near < 3 * pairs.len() {
-                tracing::warn!(
-                    "{}: the first and last speeds of only {near} of {} S' ({}) are nearer to their own scenario than to the \
-                     next one: check the ids",
-                    path.display(),
-                    pairs.len(),
-                    replay.category.label()
-                );
-            }
-        }
+        let mut studied = replays.values().filter(|replay| categories.contains(&replay.category));
+        studied.try_for_each(|replay| replay.check(path, scenarios))?;
         Ok(replays.into_values().collect())
+    }
+
+    /// Checks that every kept scenario has its S', and warns where ids seem to be those of other scenarios.
+    fn check(&self, path: &Path, scenarios: &[Scenario]) -> Result<()> {
+        let missing =
+            scenarios.iter().find(|s| s.kept && s.category == self.category && !self.scenarios.contains_key(&s.id));
+        if let Some(missing) = missing {
+            let problem = format!("scenario {} is missing; others of its category are there", missing.id);
+            return Err(Error::input(Place::file(path), problem, "give all kept scenarios of a category, or none"));
+        }
+        // Rows that were shifted or sorted have the ids of other scenarios.
+        let pairs: Vec<_> = scenarios.iter().filter_map(|s| Some((s, self.scenarios.get(&s.id)?))).collect();
+        let difference = |(s, own): (&Scenario, &ReducedScenario)| {
+            let ends = [(s.target.v.first(), own.v.first()), (s.target.v.last(), own.v.last())];
+            ends.iter().map(|(a, b)| (a.unwrap_or(&0.0) - b.unwrap_or(&0.0)).abs()).sum::<f64>()
+        };
+        let is_nearer = |(pair, next): &(_, &(&Scenario, _))| difference(*pair) <= difference((next.0, pair.1));
+        let next = pairs.iter().cycle().skip(1);
+        let near = pairs.iter().copied().zip(next).filter(is_nearer).count();
+        if pairs.len() >= 4 && 4 * near < 3 * pairs.len() {
+            tracing::warn!(
+                "{}: the first and last speeds of only {near} of {} S' ({}) are nearer to their own scenario than to the \
+                 next one: check the ids",
+                path.display(),
+                pairs.len(),
+                self.category.label()
+            );
+        }
+        Ok(())
     }
 }
 

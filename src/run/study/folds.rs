@@ -37,33 +37,3 @@ pub(super) fn folds(scenarios: &[&Scenario], count: usize) -> Result<Vec<usize>>
     }
     Ok(of)
 }
-
-#[cfg(test)]
-mod tests {
-    use std::collections::BTreeSet;
-
-    use super::*;
-    use lanesweep_model::scenario::Category;
-    use lanesweep_traffic::mining::{MiningOptions, mine_generated};
-    use lanesweep_traffic::trajectory::generator::GeneratorOptions;
-
-    #[test]
-    fn scenarios_of_a_recording_stay_together() {
-        let options = GeneratorOptions { recordings: 6, ..GeneratorOptions::default() };
-        let mined = mine_generated(&options, &MiningOptions::default(), || Ok(())).unwrap().scenarios;
-        let all: Vec<&Scenario> = mined.iter().filter(|s| s.kept && s.category == Category::Lvd).collect();
-        let of = folds(&all, 3).unwrap();
-        let mut by_recording: BTreeMap<&str, BTreeSet<usize>> = BTreeMap::new();
-        for (scenario, fold) in all.iter().zip(&of) {
-            by_recording.entry(&scenario.recording).or_default().insert(*fold);
-        }
-        assert!(by_recording.len() >= 3 && by_recording.values().all(|folds| folds.len() == 1), "{by_recording:?}");
-        assert_eq!(of.iter().collect::<BTreeSet<_>>().len(), 3, "no fold is empty");
-        // One recording is cut into stretches of time.
-        let one: Vec<&Scenario> = all.iter().filter(|s| s.recording == all[0].recording).copied().collect();
-        let mut in_time: Vec<(i64, usize)> = one.iter().map(|s| s.frame0).zip(folds(&one, 2).unwrap()).collect();
-        in_time.sort_unstable();
-        assert!(in_time.windows(2).all(|pair| pair[0].1 <= pair[1].1), "{in_time:?}");
-        assert!(folds(&one, 1).is_err() && folds(&one[..1], 2).is_err());
-    }
-}

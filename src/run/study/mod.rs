@@ -19,13 +19,13 @@ pub(crate) use cases::WINDOW;
 pub use evaluation::{CategoryNumbers, StudyEvaluation};
 pub use external_replays::ExternalReplay;
 pub use plan::{StudyOptions, outline_study, plan_study};
-pub use plan_file::StudyHead;
+pub use plan_file::{StudyHead, plan_of_parts};
 use provenance::category_provenance;
 pub use provenance::{CategoryProvenance, ParameterHistogram, StudyProvenance};
 
 pub use reference::{Difference, ReferenceComparison};
 pub use robustness::robust_lanes;
-pub use run::StudyResult;
+pub use run::{STUDY_RECORD, StudyResult};
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -37,7 +37,7 @@ use crate::score::{ScoreOptions, ScoreTable, score};
 use lanesweep_engine::{LanePlan, Partial};
 use lanesweep_model::profile::Profile;
 use lanesweep_support::run_folder::Results;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 use lanesweep_traffic::mining::{Collection, MiningOptions, counts, counts_text};
 
 /// Maximum size of the first line that is read, bytes: checksums of the pages of scenarios, data of the recordings.
@@ -99,51 +99,23 @@ pub struct Study {
 pub struct StudyBuilder<'a> {
     collection: &'a Collection,
     profile: Profile,
-    options: StudyOptions,
-    mining: MiningOptions,
-    score: ScoreOptions,
-    data: String,
-    scenario_file_sha256: Option<String>,
-    published: bool,
-    reference: bool,
+    /// Categories, models, headways, parameterizations [default: all, with the paper's headways].
+    pub options: StudyOptions,
+    /// Mining options of the scenarios, for the record.
+    pub mining: MiningOptions,
+    /// Options of the scores.
+    pub score: ScoreOptions,
+    /// Origin of the scenarios, for the report.
+    pub data: String,
+    /// SHA-256 of the file that the scenarios were read from, for the record.
+    pub scenario_file_sha256: Option<String>,
+    /// Shows the paper's published numbers with the results.
+    pub published: bool,
+    /// The lanes run in f64, by [`CpuBackend::reference`](lanesweep_engine::CpuBackend::reference).
+    pub reference: bool,
 }
 
 impl StudyBuilder<'_> {
-    /// Categories, models, headways, parameterizations [default: all, with the paper's headways].
-    pub fn options(self, options: StudyOptions) -> Self {
-        StudyBuilder { options, ..self }
-    }
-
-    /// Options of the scores.
-    pub fn score(self, score: ScoreOptions) -> Self {
-        StudyBuilder { score, ..self }
-    }
-
-    /// Mining options of the scenarios, for the record.
-    pub fn mining(self, mining: MiningOptions) -> Self {
-        StudyBuilder { mining, ..self }
-    }
-
-    /// Origin of the scenarios, for the report.
-    pub fn data(self, data: impl Into<String>) -> Self {
-        StudyBuilder { data: data.into(), ..self }
-    }
-
-    /// SHA-256 of the file that the scenarios were read from, for the record.
-    pub fn scenario_file_sha256(self, sha256: Option<String>) -> Self {
-        StudyBuilder { scenario_file_sha256: sha256, ..self }
-    }
-
-    /// Shows the paper's published numbers with the results.
-    pub fn published(self, published: bool) -> Self {
-        StudyBuilder { published, ..self }
-    }
-
-    /// Declares that the lanes run in f64, by [`CpuBackend::reference`](lanesweep_engine::CpuBackend::reference).
-    pub fn reference(self, reference: bool) -> Self {
-        StudyBuilder { reference, ..self }
-    }
-
     /// Plans the study.
     ///
     /// # Errors
@@ -157,7 +129,7 @@ impl StudyBuilder<'_> {
             return Err(Error::input(
                 Place::item(data),
                 format!("no scenario to simulate ({})", counts_text(&counts(&collection.scenarios))),
-                "use more recordings, or relax the filters ([mining] in option `config`)",
+                format!("use more recordings, or relax the filters ([mining] in {})", option("config")),
             ));
         }
         let facts = StudyProvenance {
@@ -256,4 +228,4 @@ impl Study {
     }
 }
 
-const HOW_TO_REMAKE: &str = "make it by `study` of this version, with option `plan_only`";
+const HOW_TO_REMAKE: &str = "make it by `study --plan-only` of this version";

@@ -5,7 +5,7 @@
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use lanesweep_engine::plan::Headway;
+use lanesweep_engine::plan::{Headway, LanePlan};
 use lanesweep_engine::version::Canonical;
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::profile::Profile;
@@ -107,6 +107,26 @@ impl BlockHead {
         });
         BlockHead { category, units, basis, replays }
     }
+}
+
+/// The plan of a study of these scenarios, in the order of their categories, with given decompositions: for the test that
+/// pins the bits of lanes.
+///
+/// # Errors
+/// [`Error::Internal`] for parts that do not fit.
+#[doc(hidden)]
+pub fn plan_of_parts(
+    (profile, models, headways): (Profile, Vec<ModelId>, Vec<Headway>),
+    options: ParameterizationOptions,
+    categories: &[(Category, Reduction)],
+    scenarios: &[Scenario],
+) -> Result<LanePlan> {
+    let units = |of: Category| scenarios.iter().filter(|scenario| scenario.category == of).count() as u64;
+    let block = |(of, reduction): &(Category, Reduction)| BlockHead::new(*of, units(*of), Some(reduction), Vec::new());
+    let blocks = categories.iter().map(block).collect();
+    let held: Vec<Scenario> = scenarios.iter().map(|scenario| stripped(scenario, None)).collect();
+    let head = StudyHead::new(profile, models, headways, options, blocks, &held)?;
+    head.with_scenarios(0, held)?.window(0..scenarios.len() as u64)
 }
 
 impl StudyHead {

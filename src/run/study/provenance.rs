@@ -201,23 +201,3 @@ fn bins(mut values: Vec<f64>) -> Option<(f64, f64, Vec<u64>)> {
     }
     Some((from * width, width, counts))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_value_is_in_one_bin_and_there_are_few_of_them() {
-        for n in [1_usize, 2, 10, 1000, 100_000] {
-            let values: Vec<f64> = (0..n).map(|i| libm::sin(i as f64) * 20.0 + 7.0).collect();
-            let (low, width, counts) = bins(values.clone()).unwrap();
-            assert_eq!(counts.iter().sum::<u64>(), n as u64);
-            assert!(counts.len() <= 42, "{}", counts.len());
-            assert!(values.iter().all(|v| *v >= low && *v <= low + width * counts.len() as f64 + 1e-9));
-        }
-        assert_eq!(bins(vec![3.0; 5]).unwrap().2, [5], "all alike are one bin");
-        let far = bins(vec![0.0, 0.0, 0.0, 0.0, 1e6]).unwrap();
-        assert!(far.2.len() <= 42, "an outlier makes bins wider, not more");
-        assert!(bins(vec![f64::NAN]).is_none() && bins(Vec::new()).is_none());
-    }
-}

@@ -12,7 +12,7 @@ use lanesweep_engine::{Block, CaseTable, LanePlan, Units};
 use lanesweep_model::scenario::Scenario;
 use lanesweep_model::scenario::parameterization::Reduction;
 use lanesweep_support::plain_text::hex;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 impl StudyHead {
     /// The study with some of its scenarios; `first_held` is the unit of the first one.
@@ -49,8 +49,9 @@ impl StudyHead {
         place: &Place,
         wanted: impl FnOnce(u64) -> Range<u64>,
     ) -> Result<StudyCases> {
-        let wrong =
-            |problem: String| Error::input(place.clone(), problem, "make the plan again with option `plan_only`");
+        let wrong = |problem: String| {
+            Error::input(place.clone(), problem, format!("make the plan again with {}", option("plan_only")))
+        };
         let io = |e| Error::io(place.file.clone().unwrap_or_default(), "read", e);
         let count = self.unit_count();
         let wanted = wanted(count);
@@ -104,77 +105,5 @@ impl StudyCases {
         }
         file.write_all(line)?;
         self.held.chunks(PAGE as usize).try_for_each(|page| file.write_all(&lines(page)?))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::io::{Cursor, SeekFrom};
-
-    use super::*;
-    use crate::study::plan::{StudyOptions, outline_study};
-    use lanesweep_model::profile::Profile;
-    use lanesweep_traffic::mining::{MiningOptions, mine_generated};
-    use lanesweep_traffic::trajectory::generator::GeneratorOptions;
-
-    /// Counts the bytes read.
-    struct Counted(Cursor<Vec<u8>>, usize);
-
-    impl Read for Counted {
-        fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
-            let count = self.0.read(buffer)?;
-            self.1 += count;
-            Ok(count)
-        }
-    }
-
-    impl Seek for Counted {
-        fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
-            self.0.seek(to)
-        }
-    }
-
-    #[test]
-    fn an_interval_is_read_alone_and_damage_in_it_is_found() {
-        // Enough scenarios for several pages.
-        let options = GeneratorOptions { recordings: 4, ..GeneratorOptions::default() };
-        let scenarios = mine_generated(&options, &MiningOptions::default(), || Ok(())).unwrap().scenarios;
-        let copies =
-            |copy: usize| scenarios.iter().map(move |s| Scenario { id: format!("{}~{copy}", s.id), ..s.clone() });
-        let many: Vec<Scenario> = (0..6).flat_map(copies).collect();
-        let profile = Profile::load("paper").unwrap();
-        let study = outline_study(&many, &profile, &StudyOptions::default()).unwrap();
-        let (mut records, units) = (Vec::new(), study.outline().unit_count());
-        study.write_file(b"", &mut records).unwrap();
-        assert!(units > 400, "{units}");
-        let read = |records: Vec<u8>, wanted: Range<u64>| {
-            let mut file = Counted(Cursor::new(records), 0);
-            let study = study.head().clone().read(&mut file, &Place::item("plan"), |_| wanted);
-            (study, file.1)
-        };
-        let (part, bytes) = read(records.clone(), 150..170);
-        let part = part.unwrap();
-        assert!(bytes < records.len() / 4, "{bytes} of {} bytes were read", records.len());
-        let ours = study.window(150..170).unwrap();
-        let theirs = part.window(150..170).unwrap();
-        assert_eq!((ours.hash(), ours.tables()), (theirs.hash(), theirs.tables()));
-        assert_eq!(
-            ours.key_text(&ours.key(ours.first_lane_of(160)).unwrap()),
-            theirs.key_text(&theirs.key(theirs.first_lane_of(160)).unwrap())
-        );
-        assert!(part.window(149..151).is_err() && part.write_file(b"", &mut Vec::new()).is_err());
-        let outcome = |records: Vec<u8>, wanted: Range<u64>| match read(records, wanted).0 {
-            Ok(_) => "read".to_owned(),
-            Err(error) => error.to_string(),
-        };
-        for at in [0, records.len() / 2, records.len() - 1] {
-            let mut damaged = records.clone();
-            damaged[at] ^= 1;
-            assert!(outcome(damaged.clone(), 0..units).contains("are damaged"), "byte {at}");
-            let elsewhere = if at == 0 { units - 1..units } else { 0..1 };
-            assert_eq!(outcome(damaged, elsewhere), "read", "byte {at}");
-        }
-        assert!(outcome(records[1..].to_vec(), 0..1).contains("cut off"));
-        assert!(outcome([&records[..], b"x"].concat(), 0..1).contains("added to"));
     }
 }

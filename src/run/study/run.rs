@@ -7,10 +7,11 @@ use std::path::Path;
 use super::Study;
 use crate::parts::{Computed, EachChunk, Job, Ledger, PLAN_FILE, Shard, leave_plan};
 use lanesweep_engine::{Executor, Partial, SweepSummary, Wanted};
-use lanesweep_support::input_file;
 use lanesweep_support::plain_text::sha256;
-use lanesweep_support::run_folder::STUDY_RECORD;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, input_file};
+
+/// Record of a study.
+pub const STUDY_RECORD: &str = "run.json";
 
 /// Result of a whole study.
 #[derive(Debug, Clone)]

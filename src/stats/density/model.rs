@@ -16,9 +16,8 @@ use super::valid::{VALID_FRACTION_DRAWS, ValidFraction};
 use lanesweep_model::scenario::parameterization::{
     Parameterization, ParameterizationOptions, Reduction, Sizes, SvdFit,
 };
-use lanesweep_model::scenario::{Category, Scenario};
-use lanesweep_model::scenario::{DataProvenance, Driven};
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_model::scenario::{Category, DataProvenance, Driven, Scenario};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Provenance of a density.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -142,8 +141,11 @@ impl DensityModel {
             let others: Vec<String> =
                 others.iter().filter(|(_, is_kept)| *is_kept).map(|(c, _)| c.label().to_lowercase()).collect();
             let help = match others.is_empty() {
-                true => "use more recordings, or relax the filters in the study file (option `config`)".to_owned(),
-                false => format!("use more recordings, or leave it out: option `categories = {}`", others.join(",")),
+                true => format!("use more recordings, or relax the filters in the study file ({})", option("config")),
+                false => {
+                    let others = option(&format!("categories = {}", others.join(",")));
+                    format!("use more recordings, or leave it out: {others}")
+                }
             };
             return Err(Error::input(Place::item(id.category.label()), found, help));
         }

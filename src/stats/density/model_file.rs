@@ -21,9 +21,8 @@ use lanesweep_model::scenario::parameterization::{
 };
 use lanesweep_model::scenario::{Category, Scenario, problem_of};
 use lanesweep_support::atomic_file::AtomicFile;
-use lanesweep_support::input_file;
 use lanesweep_support::plain_text::hex;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, input_file};
 
 /// Version of the file format that this program writes and reads.
 const VERSION: u64 = 2;

@@ -75,21 +75,21 @@ pub enum Warning {
 
 impl Warning {
     /// Failures below which [`Warning::FewFailures`] is raised.
-    pub const MIN_FAILURES: u64 = 10;
+    pub(crate) const MIN_FAILURES: u64 = 10;
     /// Effective number of failing scenarios below which [`Warning::FewScenarios`] is raised.
     pub const MIN_SCENARIOS: f64 = 10.0;
     /// Effective sample size over failures below which [`Warning::LowEffectiveSize`] is raised.
-    pub const MIN_EFFECTIVE_SIZE: f64 = 30.0;
+    pub(crate) const MIN_EFFECTIVE_SIZE: f64 = 30.0;
     /// Fraction of the estimate above which [`Warning::OneWeightDominates`] is raised.
-    pub const MAX_FRACTION: f64 = 0.1;
+    pub(crate) const MAX_FRACTION: f64 = 0.1;
     /// Standard errors above which [`Warning::MeanWeightOff`] is raised.
-    pub const MEAN_WEIGHT_ERRORS: f64 = 4.0;
+    pub(crate) const MEAN_WEIGHT_ERRORS: f64 = 4.0;
     /// Distance from 1 above which [`Warning::MeanWeightOff`] is raised.
-    pub const MEAN_WEIGHT_OFF: f64 = 0.2;
+    pub(crate) const MEAN_WEIGHT_OFF: f64 = 0.2;
     /// Fraction of the estimate above which [`Warning::Missed`] is raised.
-    pub const MAX_MISSED: f64 = 0.5;
+    pub(crate) const MAX_MISSED: f64 = 0.5;
     /// Fraction of void indices above which [`Warning::VoidDraws`] is raised.
-    pub const MAX_VOID_FRACTION: f64 = 0.001;
+    pub(crate) const MAX_VOID_FRACTION: f64 = 0.001;
 
     /// Whether the estimate must not be used at all.
     pub fn is_grave(&self) -> bool {

@@ -4,8 +4,7 @@ use std::borrow::Cow;
 
 use serde_json::Value;
 
-use crate::Result;
-use crate::readable;
+use crate::{Result, readable};
 
 /// Type of a column's values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -190,11 +189,6 @@ pub trait TableRows {
 
     /// Whether a selected column has lists.
     fn has_lists(&self) -> bool {
-        false
-    }
-
-    /// Whether a column has instants, which are numbers in seconds since 1970.
-    fn has_instants(&self, _column: usize) -> bool {
         false
     }
 }

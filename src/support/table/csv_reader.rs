@@ -7,8 +7,7 @@ use serde_json::Value;
 
 use super::writer::text_of_cell;
 use super::{Cell, Row, TableRows};
-use crate::input_file;
-use crate::{Error, Place, Result};
+use crate::{Error, Place, Result, input_file};
 
 /// Maximum row length, bytes. A quote that is never closed makes the rest of the file one row.
 const MAX_ROW_BYTES: u64 = 16 << 20;

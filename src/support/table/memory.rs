@@ -6,8 +6,7 @@ use serde_json::{Map, Value};
 
 use super::writer::{append_csv, csv_header};
 use super::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter, writer};
-use crate::Result;
-use crate::readable;
+use crate::{Result, readable};
 
 /// Columns and rows; every row has one cell per column.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -166,64 +165,5 @@ fn shown(column: &Column, cell: &Cell) -> String {
         Cell::Number(number) => column.digits.text(*number),
         Cell::Series(series) => series.iter().map(|number| column.digits.text(*number)).collect::<Vec<_>>().join(" "),
         Cell::Wholes(numbers) => numbers.iter().map(|number| readable::whole(*number)).collect::<Vec<_>>().join(" "),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::table::Digits;
-
-    type Row = (&'static str, Option<f64>, u64, &'static str);
-
-    fn table() -> Table {
-        let rows: [Row; 3] =
-            [("1", Some(1.0), 3, "1.2"), ("-i", None, 0, ""), ("a,b", Some(f64::INFINITY), u64::MAX, "inf")];
-        Table::of(rows)
-            .column("parameterization", |row| row.0)
-            .column(Column::from("f1").digits(Digits::Fixed(3)).null("–"), |row| row.1)
-            .column("fn", |row| row.2)
-            .column("headway", |row| row.3)
-            .column("data", |_| "synthetic")
-            .build()
-    }
-
-    #[test]
-    fn a_field_has_its_type_whatever_it_looks_like() {
-        // `is_f64` depends on the column, not the value: the number 1 is 1.0 in every row, the count 3 is 3.
-        let rows = table().records();
-        assert!(rows[0]["f1"].is_f64() && rows[0]["fn"].is_i64() && rows[0]["parameterization"].is_string());
-        assert_eq!(
-            rows,
-            serde_json::json!([
-                {"parameterization": "1", "f1": 1.0, "fn": 3, "headway": "1.2"},
-                {"parameterization": "-i", "f1": null, "fn": 0, "headway": null},
-                {"parameterization": "a,b", "f1": "Infinity", "fn": null, "headway": "inf"},
-            ])
-        );
-        let csv = "parameterization,f1,fn,headway,data\n1,1,3,1.2,synthetic\n'-i,,0,,synthetic\n\
-                   \"a,b\",inf,,inf,synthetic\n";
-        assert_eq!(table().csv(), csv);
-        assert_eq!(Table::of([0_u8; 0]).column("f1", |row| row).build().records(), serde_json::json!([]));
-    }
-
-    #[test]
-    fn a_page_and_a_terminal_show_the_digits_of_the_column() {
-        let (header, rows) = table().shown();
-        assert_eq!((table().words(), header[1].as_str()), (1, "f1"));
-        assert_eq!(rows[0], ["1", "1.000", "3", "1.2", "synthetic"]);
-        assert_eq!(rows[1], ["-i", "–", "0", "", "synthetic"]);
-        assert!(table().text().contains("| -i               |     – |"), "{}", table().text());
-    }
-
-    #[test]
-    fn a_saved_table_reads_back() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("t.jsonl");
-        table().save(&path, &TableMetadata::default()).unwrap();
-        let first = std::fs::read_to_string(&path).unwrap().lines().next().unwrap().to_owned();
-        assert_eq!(first, r#"{"parameterization":"1","f1":1.0,"fn":3,"headway":"1.2","data":"synthetic"}"#);
-        let infinite = std::fs::read_to_string(&path).unwrap().lines().nth(2).unwrap().to_owned();
-        assert!(infinite.contains(r#""f1":"Infinity""#), "a null would vanish from a filter: {infinite}");
     }
 }

@@ -103,28 +103,3 @@ fn or_list(words: &[String]) -> String {
         _ => words.concat(),
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_ending_decides_and_an_unknown_one_is_answered_with_the_known_ones() {
-        let all = [TableFormat::Csv, TableFormat::JsonLines, TableFormat::Parquet];
-        let of = |name: &str| TableFormat::of(Path::new(name), &all, "--lanes");
-        assert_eq!(of("a/lanes.CSV").unwrap(), TableFormat::Csv);
-        assert_eq!(of("lanes.ndjson").unwrap(), TableFormat::JsonLines);
-        assert_eq!(of("lanes").unwrap(), TableFormat::Csv);
-        let error = of("lanes.xlsx").unwrap_err();
-        assert!(error.to_string().contains("--lanes lanes.xlsx: `.xlsx`"), "{error}");
-        assert_eq!(error.help().unwrap(), "use a name that ends in .csv, .jsonl or .parquet");
-        assert!(TableFormat::of(Path::new("s.csv"), &all[1..], "--output").is_err());
-    }
-
-    #[cfg(not(feature = "parquet"))]
-    #[test]
-    fn without_the_feature_parquet_is_refused_by_name() {
-        let error = TableFormat::of(Path::new("s.parquet"), &[TableFormat::Parquet], "--lanes").unwrap_err();
-        assert!(error.to_string().contains("built without Parquet"), "{error}");
-    }
-}

@@ -8,12 +8,10 @@ use std::path::{Path, PathBuf};
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
-    Decimal128Type, Decimal256Type, Float16Type, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type,
-    TimestampMicrosecondType, TimestampMillisecondType, TimestampNanosecondType, TimestampSecondType, UInt8Type,
-    UInt16Type, UInt32Type, UInt64Type,
+    Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type, UInt32Type, UInt64Type,
 };
-use arrow_array::{Array, ArrayRef, RecordBatch, StructArray};
-use arrow_schema::{DataType, Field, TimeUnit};
+use arrow_array::{Array, ArrayRef, BooleanArray, ListArray, RecordBatch, StringArray, StructArray};
+use arrow_schema::{DataType, Field};
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
     ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder,
@@ -22,8 +20,7 @@ use parquet::basic::Compression;
 use serde_json::Value;
 
 use super::{Cell as TableCell, Row, TableRows};
-use crate::input_file;
-use crate::{Error, Place, Result};
+use crate::{Error, Place, Result, input_file};
 
 /// Rows decoded together, with and without lists; each may repeat a text of [`MAX_TEXT`].
 const BATCH_ROWS: [usize; 2] = [64, 256];
@@ -51,42 +48,100 @@ pub(super) struct ParquetRows {
 /// A column of a batch; a value is also null if its record is.
 struct Leaf {
     record: Option<ArrayRef>,
-    values: ArrayRef,
-    /// The values of common types; null is NaN.
-    plain: Plain,
+    values: Values,
 }
 
-/// Values of a column without nulls, or of real numbers with them, so that no value asks for its type.
-enum Plain {
+/// Values without a type to ask for.
+enum Values {
+    Nulls,
+    /// Null is NaN.
     Reals(Vec<f64>),
-    Wholes(Vec<i64>),
-    Other,
+    Wholes(Vec<Option<i64>>),
+    Flags(BooleanArray),
+    Texts(StringArray),
+    Lists(ListArray, Box<Values>),
+}
+
+impl Values {
+    fn new(array: &ArrayRef) -> std::result::Result<Values, String> {
+        macro_rules! reals {
+            ($of:ident) => {
+                Values::Reals(array.as_primitive::<$of>().iter().map(|real| real.map_or(f64::NAN, f64::from)).collect())
+            };
+        }
+        macro_rules! wholes {
+            ($of:ident) => {
+                Values::Wholes(array.as_primitive::<$of>().iter().map(|whole| whole.map(i64::from)).collect())
+            };
+        }
+        Ok(match array.data_type() {
+            DataType::Null => Values::Nulls,
+            DataType::Float32 => reals!(Float32Type),
+            DataType::Float64 => reals!(Float64Type),
+            DataType::Int8 => wholes!(Int8Type),
+            DataType::Int16 => wholes!(Int16Type),
+            DataType::Int32 => wholes!(Int32Type),
+            DataType::Int64 => wholes!(Int64Type),
+            DataType::UInt8 => wholes!(UInt8Type),
+            DataType::UInt16 => wholes!(UInt16Type),
+            DataType::UInt32 => wholes!(UInt32Type),
+            DataType::UInt64 => {
+                let wholes = array.as_primitive::<UInt64Type>().iter();
+                let wholes: std::result::Result<_, _> = wholes.map(|of| of.map(i64::try_from).transpose()).collect();
+                Values::Wholes(wholes.map_err(|_| "a whole number is above 2^63; write such numbers as texts")?)
+            }
+            DataType::Boolean => Values::Flags(array.as_boolean().clone()),
+            DataType::Utf8 => Values::Texts(array.as_string().clone()),
+            DataType::List(_) => {
+                let lists = array.as_list::<i32>();
+                Values::Lists(lists.clone(), Box::new(Values::new(lists.values())?))
+            }
+            other => return Err(format!("a column has the type {other}")),
+        })
+    }
+
+    /// A value; null for a list.
+    fn cell(&self, at: usize) -> TableCell<'_> {
+        match self {
+            Values::Reals(reals) => TableCell::Number(reals[at]),
+            Values::Wholes(wholes) => wholes[at].map_or(TableCell::Null, TableCell::Whole),
+            Values::Flags(flags) if flags.is_valid(at) => TableCell::Flag(flags.value(at)),
+            Values::Texts(texts) if texts.is_valid(at) => TableCell::text(texts.value(at)),
+            _ => TableCell::Null,
+        }
+    }
+
+    /// A value; NaN and infinity become null, because JSON lacks them.
+    fn value(&self, at: usize) -> std::result::Result<Value, String> {
+        if let Values::Lists(lists, items) = self
+            && lists.is_valid(at)
+        {
+            let length = lists.value_length(at) as usize;
+            if length > MAX_SERIES {
+                return Err(format!("a series has {length} values; at most {MAX_SERIES} can be read"));
+            }
+            let first = lists.value_offsets()[at] as usize;
+            return (first..first + length)
+                .map(|at| items.value(at))
+                .collect::<std::result::Result<_, _>>()
+                .map(Value::Array);
+        }
+        Ok(match self.cell(at) {
+            TableCell::Text(text) if text.len() > MAX_TEXT => {
+                return Err(format!("a text has {} bytes; at most {MAX_TEXT} can be read", text.len()));
+            }
+            TableCell::Text(text) => Value::from(text),
+            TableCell::Flag(value) => Value::from(value),
+            TableCell::Whole(value) => Value::from(value),
+            TableCell::Number(value) => Value::from(value),
+            _ => Value::Null,
+        })
+    }
 }
 
 impl Leaf {
-    fn new(record: Option<ArrayRef>, values: ArrayRef) -> Leaf {
-        let mut leaf = Leaf { record, values, plain: Plain::Other };
-        let (of, rows) = (leaf.values.data_type(), 0..leaf.values.len());
-        let is_usual = leaf.record.is_none() && leaf.values.null_count() == 0;
-        leaf.plain = match of {
-            // The usual ones at once.
-            DataType::Float64 if is_usual => Plain::Reals(leaf.values.as_primitive::<Float64Type>().values().to_vec()),
-            DataType::Int64 if is_usual => Plain::Wholes(leaf.values.as_primitive::<Int64Type>().values().to_vec()),
-            _ if of.is_floating() || matches!(of, DataType::Timestamp(..)) => {
-                let real = |at| if let TableCell::Number(value) = cell(&leaf, at) { value } else { f64::NAN };
-                Plain::Reals(rows.map(real).collect())
-            }
-            _ if of.is_integer() => {
-                let whole = |at| if let TableCell::Whole(value) = cell(&leaf, at) { Some(value) } else { None };
-                rows.map(whole).collect::<Option<_>>().map_or(Plain::Other, Plain::Wholes)
-            }
-            _ => Plain::Other,
-        };
-        leaf
-    }
-
     fn is_null(&self, at: usize) -> bool {
-        self.record.as_ref().is_some_and(|record| record.is_null(at)) || self.values.is_null(at)
+        self.record.as_ref().is_some_and(|record| record.is_null(at))
     }
 }
 
@@ -180,10 +235,7 @@ impl ParquetRows {
                     (Some(array.clone()), record.column(at).clone())
                 }
             };
-            if !is_readable(values.data_type()) {
-                return Err("a column changes its type".to_owned());
-            }
-            Ok(Leaf::new(record, values))
+            Ok(Leaf { record, values: Values::new(&values)? })
         };
         self.wanted.iter().map(leaf).collect()
     }
@@ -194,9 +246,21 @@ impl TableRows for ParquetRows {
         for &column in columns {
             let data_type = self.data_type(column);
             if !is_readable(&data_type) {
-                let place = Place::file(&self.path).column(&self.names[column]);
+                let name = &self.names[column];
+                let cast = |[pandas, polars]: [&str; 2]| {
+                    format!(
+                        "cast it: df[\"{name}\"].astype(\"{pandas}\") in pandas, pl.col(\"{name}\").cast(pl.{polars}) in Polars"
+                    )
+                };
+                let help = match data_type {
+                    DataType::Float16 | DataType::Decimal128(..) | DataType::Decimal256(..) => {
+                        cast(["float64", "Float64"])
+                    }
+                    DataType::Timestamp(..) => cast(["int64", "Int64"]),
+                    _ => "expected numbers, texts, truth values or lists of numbers".to_owned(),
+                };
                 let problem = format!("holds values of the type {data_type}");
-                return Err(Error::input(place, problem, "expected numbers, texts, truth values or lists of numbers"));
+                return Err(Error::input(Place::file(&self.path).column(name), problem, help));
             }
         }
         self.wanted = columns.to_vec();
@@ -237,11 +301,7 @@ impl TableRows for ParquetRows {
 
     fn cell(&self, wanted: usize) -> TableCell<'_> {
         let (leaf, at) = (&self.batch[wanted], self.at - 1);
-        match &leaf.plain {
-            Plain::Reals(values) => TableCell::Number(values[at]),
-            Plain::Wholes(values) => TableCell::Whole(values[at]),
-            Plain::Other => cell(leaf, at),
-        }
+        if leaf.is_null(at) { TableCell::Null } else { leaf.values.cell(at) }
     }
 
     fn next_row(&mut self) -> Result<Option<Row>> {
@@ -249,102 +309,23 @@ impl TableRows for ParquetRows {
             return Ok(None);
         }
         let (batch, at) = (&self.batch, self.at - 1);
-        let values = guarded(&self.path, || batch.iter().map(|leaf| value(leaf, at)).collect())?;
+        let value = |leaf: &Leaf| if leaf.is_null(at) { Ok(Value::Null) } else { leaf.values.value(at) };
+        let values = guarded(&self.path, || batch.iter().map(value).collect())?;
         Ok(Some(Row { number: self.number, values }))
     }
 
     fn has_lists(&self) -> bool {
         self.wanted.iter().any(|&column| matches!(self.data_type(column), DataType::List(_)))
     }
-
-    fn has_instants(&self, column: usize) -> bool {
-        matches!(self.data_type(column), DataType::Timestamp(..))
-    }
-}
-
-fn is_number(of: &DataType) -> bool {
-    of.is_integer() || of.is_floating() || matches!(of, DataType::Decimal128(..) | DataType::Decimal256(..))
 }
 
 /// Whether values of this type can be read. Arrow's own types (dictionaries, large lists) do not occur, because the
 /// Arrow metadata is skipped.
 fn is_readable(of: &DataType) -> bool {
+    let is_number = |of: &DataType| of.is_integer() || matches!(of, DataType::Float32 | DataType::Float64);
     match of {
-        DataType::Utf8 | DataType::Boolean | DataType::Null | DataType::Timestamp(..) => true,
+        DataType::Utf8 | DataType::Boolean | DataType::Null => true,
         DataType::List(item) => item.data_type() == &DataType::Null || is_number(item.data_type()),
         other => is_number(other),
-    }
-}
-
-/// A value of a leaf; NaN and infinity become null, because JSON lacks them.
-fn value(leaf: &Leaf, at: usize) -> std::result::Result<Value, String> {
-    if let DataType::List(_) = leaf.values.data_type()
-        && !leaf.is_null(at)
-    {
-        let items = leaf.values.as_list::<i32>().value(at);
-        if items.len() > MAX_SERIES {
-            return Err(format!("a series has {} values; at most {MAX_SERIES} can be read", items.len()));
-        }
-        let items = Leaf { record: None, values: items, plain: Plain::Other };
-        return Ok(Value::Array(
-            (0..items.values.len()).map(|at| value(&items, at)).collect::<std::result::Result<_, _>>()?,
-        ));
-    }
-    Ok(match cell(leaf, at) {
-        TableCell::Text(text) if text.len() > MAX_TEXT => {
-            return Err(format!("a text has {} bytes; at most {MAX_TEXT} can be read", text.len()));
-        }
-        TableCell::Text(text) => Value::from(text),
-        TableCell::Flag(value) => Value::from(value),
-        TableCell::Whole(value) => Value::from(value),
-        TableCell::Number(value) => Value::from(value),
-        _ => Value::Null,
-    })
-}
-
-/// A value of a leaf that has no lists.
-fn cell(leaf: &Leaf, at: usize) -> TableCell<'_> {
-    let array = &leaf.values;
-    if leaf.is_null(at) {
-        return TableCell::Null;
-    }
-    macro_rules! value {
-        ($of:ident) => {
-            array.as_primitive::<$of>().value(at)
-        };
-    }
-    match array.data_type() {
-        DataType::Utf8 => TableCell::Text(array.as_string::<i32>().value(at).into()),
-        DataType::Boolean => TableCell::Flag(array.as_boolean().value(at)),
-        DataType::Int8 => TableCell::Whole(value!(Int8Type).into()),
-        DataType::Int16 => TableCell::Whole(value!(Int16Type).into()),
-        DataType::Int32 => TableCell::Whole(value!(Int32Type).into()),
-        DataType::Int64 => TableCell::Whole(value!(Int64Type)),
-        DataType::UInt8 => TableCell::Whole(value!(UInt8Type).into()),
-        DataType::UInt16 => TableCell::Whole(value!(UInt16Type).into()),
-        DataType::UInt32 => TableCell::Whole(value!(UInt32Type).into()),
-        DataType::UInt64 => {
-            let value = value!(UInt64Type);
-            i64::try_from(value).map_or_else(|_| TableCell::Text(value.to_string().into()), TableCell::Whole)
-        }
-        DataType::Float16 => TableCell::Number(value!(Float16Type).into()),
-        DataType::Float32 => TableCell::Number(value!(Float32Type).into()),
-        DataType::Float64 => TableCell::Number(value!(Float64Type)),
-        DataType::Timestamp(TimeUnit::Second, _) => TableCell::Number(value!(TimestampSecondType) as f64),
-        DataType::Timestamp(TimeUnit::Millisecond, _) => {
-            TableCell::Number(value!(TimestampMillisecondType) as f64 / 1e3)
-        }
-        DataType::Timestamp(TimeUnit::Microsecond, _) => {
-            TableCell::Number(value!(TimestampMicrosecondType) as f64 / 1e6)
-        }
-        DataType::Timestamp(TimeUnit::Nanosecond, _) => TableCell::Number(value!(TimestampNanosecondType) as f64 / 1e9),
-        DataType::Decimal128(_, scale) => {
-            TableCell::Number(value!(Decimal128Type) as f64 / 10f64.powi(i32::from(*scale)))
-        }
-        DataType::Decimal256(_, scale) => {
-            let value = value!(Decimal256Type).to_string().parse::<f64>().unwrap_or(f64::NAN);
-            TableCell::Number(value / 10f64.powi(i32::from(*scale)))
-        }
-        _ => TableCell::Null,
     }
 }

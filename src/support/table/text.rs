@@ -100,24 +100,3 @@ fn column_widths(header: &[String], rows: &[Vec<String>], width: usize) -> Vec<u
     let left = wanted.min(width.saturating_sub(3 * sizes.len() + 1 + words));
     sizes.iter().map(|[word, line]| word + (line - word) * left / wanted.max(1)).collect()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::super::NumberText;
-    use super::*;
-
-    #[test]
-    fn a_table_that_is_too_wide_becomes_several_and_breaks_no_interval() {
-        let scores = ["0.5\n[.40 .60]", "0.6\n[.50 .70]", "0.7\n[.60 .80]", "0.8"];
-        let table = Table::of([scores])
-            .column("model", |_| "FSM")
-            .columns(0..4, |at| (at + 1).to_string(), |row, at| NumberText(row[at].to_owned()))
-            .build();
-        let one = table.fitted(1, 60);
-        let two = table.fitted(1, 35);
-        assert_eq!((one.matches("FSM").count(), two.matches("FSM").count()), (1, 2), "{two}");
-        for text in [one, two, table.fitted(1, 20)] {
-            assert!(["[.40 .60]", "[.50 .70]", "[.60 .80]"].iter().all(|interval| text.contains(interval)), "{text}");
-        }
-    }
-}

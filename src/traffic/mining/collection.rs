@@ -17,8 +17,7 @@ use crate::trajectory::generator::{GeneratorOptions, generate_one};
 use crate::trajectory::{FileChecksum, InputFile, Inputs, Loaded, Recording};
 use lanesweep_model::plausibility::Implausible;
 use lanesweep_model::scenario::{Category, Scenario, ScenarioFile, mined_id, usable};
-use lanesweep_support::readable;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option, readable};
 
 /// Results of one recording.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -132,7 +131,7 @@ pub(crate) fn filter_given(scenarios: &mut [Scenario], options: &MiningOptions, 
     }
     scenarios.iter_mut().zip(&given).for_each(|(of, kept)| of.kept = *kept);
     let is_other = given.iter().zip(&verdicts).any(|(given, (kept, _))| given != kept);
-    is_other.then(|| format!("scenarios are kept as given; by the filters (option `filter`) {text}"))
+    is_other.then(|| format!("scenarios are kept as given; by the filters ({}) {text}", option("filter")))
 }
 
 /// Names of vehicles that are longer have their number in ids.
@@ -333,27 +332,4 @@ fn driven(recording: &Recording, options: &MiningOptions) -> [f64; 2] {
         sum[1] += ego.s_m[last] - ego.s_m[0];
     }
     sum
-}
-
-#[cfg(test)]
-mod tests {
-    use std::sync::atomic::{AtomicBool, Ordering};
-
-    use super::*;
-
-    #[test]
-    fn a_file_of_any_size_is_read_and_others_wait_for_it() {
-        let (turns, has_begun) = (Turns::default(), AtomicBool::new(false));
-        let first = turns.of_bytes(u64::MAX);
-        std::thread::scope(|threads| {
-            threads.spawn(|| {
-                let _second = turns.of_bytes(1);
-                has_begun.store(true, Ordering::SeqCst);
-            });
-            std::thread::sleep(std::time::Duration::from_millis(20));
-            assert!(!has_begun.load(Ordering::SeqCst));
-            drop(first);
-        });
-        assert!(has_begun.load(Ordering::SeqCst));
-    }
 }

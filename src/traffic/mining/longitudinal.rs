@@ -157,20 +157,3 @@ pub(super) fn trailing_min(x: &[f64], window: usize) -> Vec<f64> {
         })
         .collect()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn equals_the_minimum_over_each_window() {
-        let x: Vec<f64> = (0..200).map(|i| f64::from((i * 7919) % 101)).collect();
-        for window in [0, 1, 2, 25, 300] {
-            let window_min = trailing_min(&x, window);
-            for k in 0..x.len() {
-                let expected = x[k.saturating_sub(window)..=k].iter().copied().fold(f64::INFINITY, f64::min);
-                assert_eq!(window_min[k], expected, "window {window}, sample {k}");
-            }
-        }
-    }
-}

@@ -90,26 +90,3 @@ fn each_match(
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn starts(word: &str, first: usize, pause: usize, shortest: usize) -> Vec<usize> {
-        let tags = word.chars().map(|c| Tags::default().with(Tags::LEADER, c == 'l')).collect();
-        let mut starts = Vec::new();
-        let items: [Item<Tags>; 1] = [&|t: &Tags| t.has(Tags::LEADER)];
-        each_match(&[Stretch { first, tags }], &items, pause, |m| m.len() < shortest, |_, m| starts.push(m.start()));
-        starts
-    }
-
-    #[test]
-    fn the_search_pauses_after_a_match_but_not_after_a_discarded_one() {
-        assert_eq!(starts("..ll.ll..ll", 100, 0, 1), [2, 5, 9]);
-        // The match ends at 4; the search resumes at 8 with matches that begin there or later.
-        assert_eq!(starts("..ll.ll..ll", 100, 4, 1), [2, 9]);
-        // The item still holds after the pause, so the match begins there.
-        assert_eq!(starts("..ll.lllll.", 100, 4, 1), [2, 8]);
-        assert_eq!(starts("..l.lll", 100, 4, 2), [4]);
-    }
-}

@@ -5,8 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::trajectory::{EgoViewOptions, LIMIT_TOLERANCE_M};
-use lanesweep_support::ranges;
-use lanesweep_support::{Result, settings};
+use lanesweep_support::{Result, ranges, settings};
 
 settings! {
     /// All options of `mine`. Values above 10⁶ have no meaning in traffic, and their number of samples
@@ -158,47 +157,4 @@ pub(super) fn samples(time_s: f64, frame_rate_hz: f64) -> usize {
 /// A window in samples: as [`samples`], at least one.
 pub(super) fn window_samples(window_s: f64, frame_rate_hz: f64) -> usize {
     samples(window_s, frame_rate_hz).max(1)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn defaults_are_valid_and_survive_toml() {
-        let options = MiningOptions::default();
-        options.validate().unwrap();
-        let text = toml::to_string(&options).unwrap();
-        assert_eq!(toml::from_str::<MiningOptions>(&text).unwrap(), options);
-        assert_eq!(toml::from_str::<MiningOptions>("").unwrap(), options);
-    }
-
-    #[test]
-    fn one_option_can_be_changed_alone() {
-        let options: MiningOptions = toml::from_str("[lateral]\nlc_end = \"published\"").unwrap();
-        assert_eq!(options.lateral.lc_end, LaneChangeEnd::Published);
-        assert_eq!(options.lateral.search_s, 10.0);
-    }
-
-    #[test]
-    fn a_misspelt_option_is_refused() {
-        assert!(toml::from_str::<MiningOptions>("range = 50.0").is_err());
-        assert!(toml::from_str::<MiningOptions>("[cut_in]\nmax_thw = 1.0").is_err());
-    }
-
-    #[test]
-    fn a_window_of_no_length_is_refused_by_name() {
-        let mut options = MiningOptions::default();
-        options.lateral.window_s = 0.0;
-        assert!(options.validate().unwrap_err().to_string().contains("lateral.window_s"));
-        let options = MiningOptions { leader_max_thw_s: f64::NAN, ..MiningOptions::default() };
-        assert!(options.validate().unwrap_err().to_string().contains("leader_max_thw_s"));
-    }
-
-    #[test]
-    fn windows_are_whole_samples_at_any_rate() {
-        assert_eq!(window_samples(1.0, 25.0), 25);
-        assert_eq!(window_samples(1.0, 29.97), 30);
-        assert_eq!(window_samples(1.0, 0.2), 1);
-    }
 }

@@ -158,34 +158,3 @@ pub fn find_match<T>(tags: &[T], items: &[Item<T>], from: usize) -> Option<Match
 fn run_end<T>(tags: &[T], item: Item<T>, k: usize) -> usize {
     tags[k..].iter().position(|t| !item(t)).map_or(tags.len(), |n| k + n)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Items `a` then `b` in a word.
-    fn ab(word: &str, from: usize) -> Option<Match> {
-        let letters: Vec<char> = word.chars().collect();
-        find_match(&letters, &[&|&c| c == 'a', &|&c| c == 'b'], from)
-    }
-
-    #[test]
-    fn an_item_begins_exactly_when_the_one_before_ends() {
-        assert_eq!(ab("..aabbb.", 0), Some(Match { starts: vec![2, 4], end: 7, clamped: false }));
-        assert_eq!(ab("..aa.bbb.", 0), None);
-        assert_eq!(ab("..bbaa.aab.", 0), Some(Match { starts: vec![7, 9], end: 10, clamped: false }));
-    }
-
-    #[test]
-    fn an_item_that_already_holds_begins_where_the_search_begins() {
-        assert_eq!(ab("aaab.", 2).map(|m| m.starts), Some(vec![2, 3]));
-        assert_eq!(ab("aaab.ab.", 3).map(|m| m.starts), Some(vec![5, 6]));
-        assert_eq!(ab("aaab.", 9), None);
-    }
-
-    #[test]
-    fn a_match_that_lasts_to_the_end_ends_at_the_last_sample() {
-        let found = ab(".aabb", 0).unwrap();
-        assert_eq!((found.end, found.clamped, found.last_item(), found.len()), (4, true, 3..5, 3));
-    }
-}

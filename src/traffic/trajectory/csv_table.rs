@@ -13,10 +13,9 @@ use csv::{ByteRecord, Reader, ReaderBuilder, Terminator};
 use sha2::{Digest, Sha256};
 
 use super::number;
-use lanesweep_support::input_file;
 use lanesweep_support::plain_text::nearest;
 use lanesweep_support::table::{delimiter_of, has_decimal_commas};
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, input_file};
 
 /// Identity of a file's content in the run record.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -271,7 +270,7 @@ impl CsvTable {
 
     /// A field as messages show it.
     pub(super) fn shown(&self, column: CsvColumn) -> String {
-        excerpt(&String::from_utf8_lossy(self.bytes(column)))
+        quoted(&String::from_utf8_lossy(self.bytes(column)))
     }
 
     /// Closes the file; the checksum covers the bytes read, which is the whole file after the last row.
@@ -325,7 +324,7 @@ impl CsvTable {
         hashing.at_end && self.reader.position().byte() == hashing.bytes
     }
 
-    /// Number of line ends inside excerpt fields of the record.
+    /// Number of line ends inside quoted fields of the record.
     fn inner_line_ends(&self) -> u64 {
         self.record.as_slice().iter().filter(|&&byte| byte == b'\n').count() as u64
     }
@@ -408,15 +407,15 @@ fn header_name(field: &[u8]) -> String {
 /// The first few column names for a message, without control characters.
 fn list(names: &[&str]) -> String {
     const SHOWN: usize = 10;
-    let mut shown: Vec<String> = names.iter().take(SHOWN).map(|name| excerpt(name)).collect();
+    let mut shown: Vec<String> = names.iter().take(SHOWN).map(|name| quoted(name)).collect();
     if names.len() > SHOWN {
         shown.push(format!("{} more", names.len() - SHOWN));
     }
     shown.join(", ")
 }
 
-/// Text of a user's file in messages: excerpt, without control characters, truncated.
-pub(super) fn excerpt(text: &str) -> String {
+/// Text of a user's file in messages: quoted, without control characters, truncated.
+pub(super) fn quoted(text: &str) -> String {
     const SHOWN: usize = 40;
     let end = if text.chars().nth(SHOWN).is_some() { "…" } else { "" };
     format!("`{}{end}`", text.chars().take(SHOWN).flat_map(char::escape_debug).collect::<String>())

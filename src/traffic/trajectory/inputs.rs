@@ -7,9 +7,9 @@ use super::recording::Loaded;
 use super::tracks::{self, HIGHD, LoadedTracks, Preset, TrackFile, Understanding};
 use lanesweep_model::plausibility::Implausible;
 use lanesweep_support::atomic_file::folder_of;
-use lanesweep_support::files::file_name;
+use lanesweep_support::files::{file_name, files_of};
 use lanesweep_support::input_file::unpacked;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Recordings whose format is known: highD's, or that of a preset.
 #[derive(Debug, Default)]
@@ -157,7 +157,8 @@ impl InputFile {
                 let place = Place::file(&self.paths()[0]).of(format!("recording {}", loaded.recording.id));
                 let format = if matches!(self, InputFile::Highd(_)) { HIGHD_HELP } else { "" };
                 let help = format!(
-                    "`lanesweep tracks` shows all; option `accept_implausible` uses the tracks as they are{format}"
+                    "`lanesweep tracks` shows all; {} uses the tracks as they are{format}",
+                    option("accept_implausible")
                 );
                 return Err(Error::input(place, grave.text.clone(), help));
             }
@@ -200,16 +201,6 @@ fn highd_inputs(path: &Path) -> Result<Inputs> {
     let name = file_name(path);
     let id = unpacked(&name).strip_suffix(HIGHD_ENDING).unwrap_or(&name);
     Ok(Inputs { highd: vec![HighdFiles::found(folder_of(path), id)], ..Inputs::default() })
-}
-
-/// The files of a folder, sorted; hidden ones are left out.
-pub(super) fn files_of(folder: &Path) -> Result<Vec<PathBuf>> {
-    let listed = std::fs::read_dir(folder).map_err(|e| Error::io(folder, "list", e))?;
-    let is_hidden = |path: &PathBuf| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
-    let mut files: Vec<PathBuf> =
-        listed.flatten().map(|entry| entry.path()).filter(|path| !path.is_dir() && !is_hidden(path)).collect();
-    files.sort();
-    Ok(files)
 }
 
 /// The first file of a folder that may hold tracks; those with highD's names come first.
@@ -281,7 +272,7 @@ fn unknown(path: &Path) -> Error {
     Error::input(
         Place::file(path),
         format!("no preset fits this file{columns}"),
-        "name a preset by option `preset`, or rename the columns as in the preset `generic`",
+        format!("name a preset by {}, or rename the columns as in the preset `generic`", option("preset")),
     )
 }
 

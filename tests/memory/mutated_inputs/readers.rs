@@ -2,17 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use lanesweep::engine::{Backend, CpuBackend, Headway, LanePlan, Partial, SampleTally, Wanted};
-use lanesweep::model::criterion::Criterion;
+use lanesweep::engine::{Backend, CpuBackend, Headway, LanePlan, SampleTally, Wanted};
 use lanesweep::model::plausibility::Implausible;
 use lanesweep::model::profile::Profile;
-use lanesweep::run::parts::{Counted, Journal, Ledger, MergeableCounts, read_part, read_sealed_line};
-use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, WeightedTally, plan_samples, read_proposal};
-use lanesweep::run::score::ScoreOptions;
-use lanesweep::run::study::{ExternalReplay, StudyHead, StudyOptions, plan_study};
+use lanesweep::run::parts::{Counted, Journal, Ledger, read_part, read_sealed_line};
+use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, plan_samples, read_proposal};
+use lanesweep::run::study::{StudyHead, StudyOptions, plan_study};
 use lanesweep::scenario::DataProvenance;
 use lanesweep::scenario::parameterization::ParameterizationOptions;
-use lanesweep::scenario::{Category, Scenario, read_scenarios};
+use lanesweep::scenario::{Scenario, read_scenarios};
 use lanesweep::stats::density::{DensityModel, Exposure, read_density};
 use lanesweep::stats::random::Stream;
 use lanesweep::traffic::mining::{MiningOptions, mine, mine_folder};
@@ -42,18 +40,13 @@ pub fn all(seeds: &Seeds) -> Vec<Reader> {
         plain("profile", profile),
         plain("mining options", mining),
         plain("parameterization options", parameterization),
-        plain("score options", |b, _, _, _| options::<ScoreOptions>(b)?.validate()),
         plain("proposal", proposal),
-        plain("exiD tracks", exid),
         plain("track table", |b, d, _, _| tracks_named("own.csv", b, d)),
         plain("preset", preset),
         plain("density", density),
-        plain("external S'", external),
         plain("part", part),
         plain("plan", plan),
         plain("journal", journal),
-        plain("weighted part", weighted_part),
-        plain("study part", study_part),
     ]
 }
 
@@ -71,13 +64,6 @@ fn tracks_named(name: &str, bytes: &[u8], dir: &Path) -> Result<()> {
 
 fn removed(paths: &[PathBuf]) {
     paths.iter().for_each(|path| std::fs::remove_file(path).expect("the temporary folder can be written to"));
-}
-
-fn exid(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {
-    let meta = file(b"recordingId,frameRate\n0,25\n", dir, "01_recordingMeta.csv");
-    let read = tracks_named("01_tracks.csv", bytes, dir);
-    removed(&[meta]);
-    read
 }
 
 fn preset(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
@@ -173,15 +159,6 @@ fn density(bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> {
     if heavy { run_some(&plan, 2) } else { Ok(()) }
 }
 
-/// S' of another program.
-fn external(bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> {
-    let path = file(bytes, dir, "other.jsonl");
-    let external = ExternalReplay::read(&path, &seeds.scenarios, &Category::ALL, Implausible::Refused)?;
-    let options = StudyOptions { headways: vec![Headway::ThwS(1.0)], external, ..StudyOptions::default() };
-    let plan = plan_study(&seeds.scenarios, &seeds.profile, &options)?;
-    if heavy { run_some(&plan, 1) } else { Ok(()) }
-}
-
 fn proposal(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
     let proposal = read_proposal(&file(bytes, dir, "g.json"), &seeds.density)?;
     let stream = Stream { seed: 5, purpose: 1 };
@@ -222,35 +199,5 @@ fn journal(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {
     Ok(())
 }
 
-/// The units of the parts that are made as seeds: of samples, of a study, of weighted sums.
+/// The units of the part that is made as a seed.
 pub const PART_UNITS: std::ops::Range<u64> = 3..17;
-pub const STUDY_UNITS: std::ops::Range<u64> = 1..3;
-pub const WEIGHTED_UNITS: std::ops::Range<u64> = 5..14;
-
-fn weighted_part(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {
-    let path = file(bytes, dir, "part.json");
-    let part = read_part::<WeightedTally>(&path, "00", &WEIGHTED_UNITS, "again")?;
-    for segment in part.segments {
-        for (_, sums) in &segment.sums {
-            sums.total().unwrap_or_default().figures();
-        }
-        // The same samples twice have to be refused.
-        assert!(segment.covered().is_empty() || segment.clone().join(segment).is_err());
-    }
-    Ok(())
-}
-
-fn study_part(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
-    let path = file(bytes, dir, "part.json");
-    let part = read_part::<Partial>(&path, "00", &STUDY_UNITS, "again")?;
-    for partial in part.segments {
-        partial.covered();
-        let merged = Partial::empty(&seeds.study).merge(partial)?;
-        merged.covered();
-        merged.is_complete(&seeds.study);
-    }
-    Ok(())
-}
-
-/// The criterion of the parts that are made as seeds.
-pub const CRITERION: Criterion = Criterion::Collision;

@@ -4,24 +4,20 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
-use lanesweep::engine::{Backend, CpuBackend, LanePlan, Partial, SampleTally, Wanted};
-use lanesweep::model::driver::ModelId;
+use lanesweep::engine::{Backend, CpuBackend, SampleTally, Wanted};
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::{Counted, Journal, MergeableCounts, Part, seal, write_part};
-use lanesweep::run::sampling::{Question, WeightedTally, proposal_text};
-use lanesweep::run::score::ScoreOptions;
+use lanesweep::run::sampling::proposal_text;
 use lanesweep::run::study::{StudyOptions, outline_study};
 use lanesweep::scenario::parameterization::ParameterizationOptions;
 use lanesweep::scenario::{Category, Scenario, write_scenarios};
 use lanesweep::scenario::{DataProvenance, Driven};
 use lanesweep::stats::density::{DensityModel, write_density};
-use lanesweep::stats::estimate::{BlockSums, WeightSums};
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::Recording;
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
-use super::plans;
-use super::readers::{CRITERION, PART_UNITS, STUDY_UNITS, WEIGHTED_UNITS, small_plan};
+use super::readers::{PART_UNITS, small_plan};
 use super::small;
 use crate::common::mined::{fitted, provenance};
 
@@ -35,7 +31,6 @@ pub struct Seeds {
     /// Of each reader, by its name.
     pub files: BTreeMap<&'static str, Vec<Vec<u8>>>,
     pub profile: Profile,
-    pub study: LanePlan,
     /// The density that proposals and parts belong to.
     pub density: DensityModel,
 }
@@ -86,13 +81,6 @@ fn track_tables() -> Vec<Vec<u8>> {
             |v, k, x, y| format!("{v},{k},{:.2},{:.2},15,6,2,98,0,{},us-101", 3.28 * y, 3.28 * x, v % 2),
         ),
     ]
-}
-
-fn exid() -> Vec<Vec<u8>> {
-    vec![track_table(
-        "recordingId,trackId,frame,xCenter,yCenter,heading,width,length,xVelocity,yVelocity,xAcceleration,yAcceleration,latLaneCenterOffset,laneletId",
-        |v, k, x, y| format!("0,{v},{k},{x:.2},{y:.2},0,1.8,4.5,75,0,0,0,0.1;0.2,{};77", v % 2),
-    )]
 }
 
 fn presets() -> Vec<Vec<u8>> {
@@ -170,13 +158,6 @@ impl Seeds {
             let (mut journal, _) = Journal::open(path, "00", PART_UNITS).unwrap();
             journal.append(&[Counted { counts: tally.clone(), redone_and_rechecked: [0; 2] }]).unwrap();
         });
-        let sums = |k: u64| WeightSums { draws: k, failing: 0.5, ..WeightSums::default() };
-        let leaves: Vec<WeightSums> = (0..9).map(sums).collect();
-        let question = |model| Question { model, criterion: CRITERION, headway: 0 };
-        let sums = ModelId::ALL.into_iter().map(|m| (question(m), BlockSums::of_leaves(5, &leaves))).collect();
-        let study = plans::plan(&[(Category::CutIn, 2, &["1"]), (Category::Lvd, 2, &["i"])]);
-        let lane = |lane: u64| (lanesweep::engine::Verdicts((lane % 16) as u8), lane as f64 / 8.0);
-        let partial = Partial::from_chunk(&study, &plans::chunk(&study, STUDY_UNITS, &lane, false)).unwrap();
         let driven = Some(Driven { hours: Some(1.5), kilometres: Some(90.0) });
         let exposure = DataProvenance { scenarios_sha256: "00".to_owned(), driven, ..provenance() };
         let texts = small::Texts::small();
@@ -202,7 +183,6 @@ impl Seeds {
             ("tracks", vec![recording[0].clone()]),
             ("tracksMeta", vec![recording[1].clone()]),
             ("recordingMeta", vec![recording[2].clone()]),
-            ("external S'", scenario_files[..1].to_vec()),
             ("scenarios", scenario_files.into()),
             // A row per instant, and one per concrete case.
             ("scenario table", vec![INSTANTS.into(), CASES.into()]),
@@ -210,18 +190,14 @@ impl Seeds {
             ("profile", ["paper", "jrc-2021"].map(profile_text).into()),
             ("mining options", toml(toml::to_string(&MiningOptions::default()).unwrap())),
             ("parameterization options", toml(toml::to_string(&ParameterizationOptions::default()).unwrap())),
-            ("score options", toml(toml::to_string(&ScoreOptions::default()).unwrap())),
             ("density", std::iter::once(&density).chain(&others).map(file_of).collect()),
-            ("exiD tracks", exid()),
             ("track table", track_tables()),
             ("preset", presets()),
             ("proposal", toml(proposal_text(&density, &density.kde.mixture().unwrap()).unwrap())),
             ("part", vec![part(PART_UNITS, tally)]),
             ("plan", vec![plan_file]),
             ("journal", vec![journal]),
-            ("weighted part", vec![part(WEIGHTED_UNITS, WeightedTally { sums })]),
-            ("study part", vec![part(STUDY_UNITS, partial)]),
         ]);
-        Seeds { recording, loaded: small::recording(), scenarios: few, files, profile, study, density }
+        Seeds { recording, loaded: small::recording(), scenarios: few, files, profile, density }
     }
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use super::{Bench, RUNS, SAMPLE, STUDY, same, shared};
-use crate::common::program::{self, PROGRAM, files, ran, unbroken, words};
+use crate::common::program::{PROGRAM, ran, unbroken, words};
 use crate::common::skipped;
 
 /// Runs a shell script with an empty disk of its own at `$DISK`; `None` where this machine allows no mounts.
@@ -55,39 +55,6 @@ fn a_disk_that_fills_up_is_told_and_the_same_command_ends_well_once_there_is_spa
         }
     }
     assert!(of_journals > 0, "no journal met the full disk");
-}
-
-#[test]
-fn recordings_and_scenarios_that_do_not_fit_leave_nothing_that_looks_whole() {
-    let bench = Bench::new();
-    let dir = bench.path();
-    let synth = "-q tracks --synth-recordings 2 --config generator.duration_s=20 --convert";
-    ran(dir, &format!("{synth} whole/tracks"));
-    ran(dir, "-q tracks --convert recordings --synth-recordings 6");
-    std::fs::create_dir_all(dir.join("whole/mine")).unwrap();
-    ran(dir, "-q mine recordings --out whole/mine/s.jsonl");
-    // The first recording fits, the second only to its half.
-    let size = |file: &str| std::fs::metadata(dir.join("whole/tracks").join(file)).unwrap().len();
-    let half = format!("{}k", (size("01_tracks.csv") + size("02_tracks.csv") / 2) / 1024 + 32);
-    for (name, line, size, file, cut_off) in [
-        ("tracks", synth, &*half, "", "02_tracks.csv"),
-        ("mine", "-q mine recordings --out", "8k", "/s.jsonl", "s.jsonl"),
-        ("mine", "-q mine recordings --out", "24k", "/s.jsonl", "s.jsonl"),
-    ] {
-        let script = format!(
-            "mkdir -p \"$DISK/out\"\n\
-            \"$0\" \"$@\" \"$DISK/out{file}\" >/dev/null; echo full $?; ls -A \"$DISK/out\"\n\
-            mount -o remount,size=64m \"$DISK\"\n\
-            \"$0\" \"$@\" \"$DISK/out{file}\" >/dev/null; echo freed $?\n\
-            cp -r \"$DISK/out\" copy"
-        );
-        let Some(output) = on_a_disk(&bench, size, &script, line) else { return };
-        let said = unbroken(&output.stderr);
-        assert_eq!(lines(&output), ["full 6", "freed 0"], "{name}, {size}: {said}");
-        assert!(said.contains(cut_off) && said.contains("the disk is full"), "{name}, {size}: {said}");
-        program::same(&files(&dir.join("copy")), &files(&dir.join("whole").join(name)), name);
-        std::fs::remove_dir_all(dir.join("copy")).unwrap();
-    }
 }
 
 #[test]

@@ -103,25 +103,3 @@ fn after_a_panic_in_a_worker_or_a_lost_device_the_journal_is_whole_and_another_b
         }
     }
 }
-
-#[test]
-fn a_device_that_is_lost_in_mid_run_is_stood_in_for_and_the_counts_are_the_same() {
-    let options = SetOptions { size: 800, ..Default::default() };
-    let plan = random_plan(&Profile::load("paper").unwrap(), &options).unwrap();
-    let cpu = CpuBackend::lane_arithmetic();
-    let counted = |backend: &dyn Backend| {
-        let executor = Executor::new(backend).with_fallback(&cpu);
-        let mut partial = Partial::empty(&plan);
-        let summary = executor.sweep(&plan, 0..plan.unit_count(), Wanted::Verdicts, |chunk| {
-            partial = partial.clone().merge(Partial::from_chunk(&plan, &chunk)?)?;
-            Ok(())
-        });
-        (partial, summary.unwrap())
-    };
-    let (expected, _) = counted(&cpu);
-    for after in [0, 2] {
-        let (partial, summary) = counted(&Failing { after, how: Failure::DeviceLost });
-        assert_eq!(partial, expected);
-        assert!(summary.redone_lanes > 0 && summary.lanes == plan.lane_count(), "{summary:?}");
-    }
-}

@@ -3,8 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use lanesweep_support::ranges;
-use lanesweep_support::{Result, settings};
+use lanesweep_support::{Result, ranges, settings};
 
 /// What a constant acceleration does after the scenario's duration T.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

@@ -8,7 +8,7 @@ use super::series::{lateral_speed, mean_acceleration};
 use super::sizes::vehicle_ahead;
 use crate::plausibility::Quantity;
 use crate::scenario::{Category, Scenario};
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Minimum duration T of a valid point and of a reconstruction, s.
 pub const MIN_DURATION_S: f64 = 0.1;
@@ -130,7 +130,7 @@ impl Variable {
                 Error::input(
                     Place::item(format!("scenario {}", scenario.id)).column("thw0"),
                     "no observed headway, which the dimension `thw_s` needs (the ego may have stood)",
-                    "leave the scenario out or fit without option `with_thw`",
+                    format!("leave the scenario out or fit without {}", option("with_thw")),
                 )
             })?,
         })

@@ -103,28 +103,3 @@ impl Braking {
         self.elapsed_s >= self.second.unwrap_or(self.first).end_s()
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::super::random::Purpose;
-    use super::*;
-
-    #[test]
-    fn a_braking_rises_to_its_peak_without_jumps_and_ends() {
-        let mut stream = TrafficRandom::new(5, 0, 0, Purpose::Decision);
-        for _ in 0..500 {
-            let mut braking = Braking::draw(&Behaviour::default(), &mut stream);
-            let (mut before, mut peak) = (0.0, 0.0_f64);
-            while !braking.is_over() {
-                let a = braking.acceleration();
-                assert!((a - before).abs() < 1.0, "jump from {before} to {a}");
-                assert!(a <= 0.0);
-                (before, peak) = (a, peak.max(-a));
-                braking.elapsed_s += 0.04;
-                assert!(braking.elapsed_s < 70.0);
-            }
-            assert!(peak > 0.95 * WEAKEST_PEAK_MPS2 && peak <= HARDEST_PEAK_MPS2, "{peak}");
-            assert_eq!(braking.acceleration(), 0.0);
-        }
-    }
-}

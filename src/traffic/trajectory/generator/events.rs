@@ -7,8 +7,8 @@
 use super::braking::Braking;
 use super::lane_change::{Manner, Way, acceptance, motive};
 use super::lateral::LaneChangeMotion;
-use super::traffic::{Traffic, centre_of};
-use super::vehicle::draw_line;
+use super::traffic::{DECISION_S, Hazards, Traffic};
+use super::vehicle::{centre_of, draw_line};
 use crate::trajectory::VehicleClass;
 
 /// Distance before the view at which the raised rates begin, so that changes are in progress at its edge.
@@ -101,32 +101,5 @@ impl Traffic<'_> {
         own.line_m = target_m;
         own.occupied |= 1 << to;
         own.change = Some(change);
-    }
-}
-
-/// Time between two decisions of one driver, s.
-pub(super) const DECISION_S: f64 = 0.2;
-/// Minimum time from the end of a lane change to the next decision, s.
-pub(super) const SETTLE_S: f64 = 4.0;
-/// Lane changes obstruct each other: to raise their rate by a factor f, their hazard is multiplied by f to this
-/// power.
-const CROWDING: f64 = 1.56;
-
-/// Factors on the hazards.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Hazards {
-    pub brakings: f64,
-    pub lane_changes: f64,
-}
-
-impl Hazards {
-    /// As published.
-    const UNRAISED: Hazards = Hazards { brakings: 1.0, lane_changes: 1.0 };
-
-    /// The factors that raise both rates by `factor`.
-    pub(super) fn raised(factor: f64) -> Hazards {
-        // There is no crowding below the published rates.
-        let lane_changes = if factor > 1.0 { libm::pow(factor, CROWDING) } else { factor };
-        Hazards { brakings: factor, lane_changes }
     }
 }

@@ -2,8 +2,7 @@
 
 use super::options::GeneratorOptions;
 use super::random::TrafficRandom;
-use super::traffic::centre_of;
-use super::vehicle::{Vehicle, draw_line};
+use super::vehicle::{Vehicle, centre_of, draw_line};
 use crate::trajectory::VehicleClass;
 
 /// Fraction of arrivals that follow the previous vehicle at their desired headway, at the published flow or more; the

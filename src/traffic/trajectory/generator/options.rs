@@ -4,8 +4,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use lanesweep_support::ranges;
-use lanesweep_support::{Result, settings};
+use lanesweep_support::{Result, ranges, settings};
 
 settings! {
     /// Options of the generator. `lanesweep study` without data uses the default.
@@ -110,30 +109,5 @@ settings! {
         /// deceleration.
         #[schemars(range(min = 0.0, max = 2.0))]
         pub overreaction: f64 = 0.226,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_defaults_are_valid_and_a_bad_option_is_named() {
-        GeneratorOptions::default().validate().unwrap();
-        let error = GeneratorOptions { duration_s: f64::NAN, ..GeneratorOptions::default() }.validate().unwrap_err();
-        assert!(error.to_string().contains("duration_s"), "{error}");
-        let error = GeneratorOptions { recordings: 0, ..GeneratorOptions::default() }.validate().unwrap_err();
-        assert!(error.to_string().contains("recordings"), "{error}");
-    }
-
-    #[test]
-    fn a_sample_is_split_until_the_step_is_short_enough() {
-        let steps =
-            |frame_rate_hz| GeneratorOptions { frame_rate_hz, ..GeneratorOptions::default() }.steps_per_sample();
-        assert_eq!(steps(25.0), 1);
-        assert_eq!(steps(10.0), 3);
-        assert_eq!(steps(50.0), 1);
-        assert_eq!(steps(30.0), 1);
-        assert_eq!(steps(1.0), 25);
     }
 }

@@ -94,37 +94,3 @@ impl TrafficRandom {
         value.clamp(low, high)
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_stream_is_named_by_seed_recording_carriageway_and_purpose() {
-        let first =
-            |seed, recording, carriageway, purpose| TrafficRandom::new(seed, recording, carriageway, purpose).uniform();
-        let base = first(1, 0, 0, Purpose::Noise);
-        assert_eq!(base, first(1, 0, 0, Purpose::Noise));
-        assert_ne!(base, first(2, 0, 0, Purpose::Noise));
-        assert_ne!(base, first(1, 1, 0, Purpose::Noise));
-        assert_ne!(base, first(1, 0, 1, Purpose::Noise));
-        assert_ne!(base, first(1, 0, 0, Purpose::Inflow));
-    }
-
-    #[test]
-    fn normal_and_exponential_have_their_moments() {
-        let mut stream = TrafficRandom::new(7, 0, 0, Purpose::Site);
-        let n = 40_000;
-        let (mut sum, mut squares, mut waiting) = (0.0, 0.0, 0.0);
-        for _ in 0..n {
-            let z = stream.normal();
-            sum += z;
-            squares += z * z;
-            waiting += stream.exponential(3.0);
-        }
-        let n = f64::from(n);
-        assert!((sum / n).abs() < 0.02, "mean {}", sum / n);
-        assert!((squares / n - 1.0).abs() < 0.03, "variance {}", squares / n);
-        assert!((waiting / n - 3.0).abs() < 0.06, "mean wait {}", waiting / n);
-    }
-}

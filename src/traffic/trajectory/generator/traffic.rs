@@ -2,14 +2,40 @@
 //! arrive upstream, follow, change lanes, brake and leave downstream. All decisions and accelerations of
 //! a step read the state at its start; then every vehicle moves.
 
-use super::events::{DECISION_S, Hazards, SETTLE_S};
 use super::idm::{HARDEST_BRAKING_MPS2, LeaderView, following_acceleration, free_acceleration};
 use super::inflow::{Inflow, LaneDemand};
 use super::lane_change::{LaneView, Neighbour};
 use super::options::GeneratorOptions;
 use super::random::{Purpose, TrafficRandom};
-use super::vehicle::Vehicle;
+use super::vehicle::{Vehicle, centre_of};
 use crate::trajectory::VehicleClass;
+
+/// Time between two decisions of one driver, s.
+pub(super) const DECISION_S: f64 = 0.2;
+/// Minimum time from the end of a lane change to the next decision, s.
+const SETTLE_S: f64 = 4.0;
+/// Lane changes obstruct each other: to raise their rate by a factor f, their hazard is multiplied by f to this
+/// power.
+const CROWDING: f64 = 1.56;
+
+/// Factors on the hazards.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Hazards {
+    pub brakings: f64,
+    pub lane_changes: f64,
+}
+
+impl Hazards {
+    /// As published.
+    pub(super) const UNRAISED: Hazards = Hazards { brakings: 1.0, lane_changes: 1.0 };
+
+    /// The factors that raise both rates by `factor`.
+    fn raised(factor: f64) -> Hazards {
+        // There is no crowding below the published rates.
+        let lane_changes = if factor > 1.0 { libm::pow(factor, CROWDING) } else { factor };
+        Hazards { brakings: factor, lane_changes }
+    }
+}
 
 /// Road before the camera's view, m. Followers need this distance to settle behind their leaders. On a longer road,
 /// vehicles would be sorted by speed before they enter the view.
@@ -303,11 +329,6 @@ impl<'a> Traffic<'a> {
         self.order.retain(|&i| vehicles[i].s_m < end_m);
         self.step += 1;
     }
-}
-
-/// Lateral position of a lane's centre: the leftmost line is 0, left is positive.
-pub(super) fn centre_of(lane: usize, lane_width_m: f64) -> f64 {
-    -(lane as f64 + 0.5) * lane_width_m
 }
 
 fn lane_of(d_m: f64, lane_width_m: f64, lanes: usize) -> usize {

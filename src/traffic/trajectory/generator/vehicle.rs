@@ -9,6 +9,11 @@ use crate::trajectory::VehicleClass;
 /// Standard deviation of the drivers' lateral positions in their lane, m.
 const LINE_SD_M: f64 = 0.18;
 
+/// Lateral position of a lane's centre: the leftmost line is 0, left is positive.
+pub(super) fn centre_of(lane: usize, lane_width_m: f64) -> f64 {
+    -(lane as f64 + 0.5) * lane_width_m
+}
+
 /// The camera's samples of a vehicle.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Samples {

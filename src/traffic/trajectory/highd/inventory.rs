@@ -4,10 +4,9 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::trajectory::inputs::files_of;
 use crate::trajectory::tracks::may_hold_tracks;
-use lanesweep_support::input_file;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::files::files_of;
+use lanesweep_support::{Error, Place, Result, input_file};
 
 /// The three files of one recording.
 #[derive(Debug, Clone, PartialEq, Eq)]

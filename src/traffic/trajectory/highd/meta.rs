@@ -4,9 +4,8 @@
 use super::format::{FRAME_RATES_HZ, LANE_LINES_LIMIT, RECORDING_META_HEADER, TRACKS_META_HEADER, csv_format};
 use super::frame::{Direction, LaneNumbers};
 use super::inventory::HighdFiles;
-use crate::trajectory::csv_table::{CsvColumn, CsvTable, FileChecksum, excerpt};
-use crate::trajectory::number;
-use crate::trajectory::{Carriageway, VehicleClass};
+use crate::trajectory::csv_table::{CsvColumn, CsvTable, FileChecksum, quoted};
+use crate::trajectory::{Carriageway, VehicleClass, number};
 use lanesweep_model::plausibility::{Doubts, HELP, Quantity};
 use lanesweep_support::{Error, Place, Result};
 
@@ -107,7 +106,7 @@ fn check_plausible(
     doubts: &mut Doubts,
 ) -> Result<()> {
     let judged = doubts.check(quantity, value, || table.field(column).to_string());
-    judged.map_err(|problem| table.bad(column, problem, HELP))
+    judged.map_err(|problem| table.bad(column, problem, HELP.as_str()))
 }
 
 fn yes_or_no(table: &CsvTable, column: CsvColumn) -> Result<bool> {
@@ -155,7 +154,7 @@ fn markings(table: &CsvTable, column: CsvColumn) -> Result<Vec<f64>> {
     for part in text.trim_end_matches(';').split(';') {
         let line = number::real(part.as_bytes())
             .filter(|line| line.abs() <= number::REAL_LIMIT)
-            .ok_or_else(|| bad(format!("the lane line {} is not a finite number", excerpt(part))))?;
+            .ok_or_else(|| bad(format!("the lane line {} is not a finite number", quoted(part))))?;
         if let Some(&above) = lines.last()
             && line <= above
         {

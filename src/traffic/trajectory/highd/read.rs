@@ -6,9 +6,8 @@ use std::path::Path;
 use super::format::{FRAME_LIMIT, TRACKS_HEADER, csv_format};
 use super::inventory::{HighdFiles, made_up};
 use super::meta::{self, RecordingMeta, VehicleMeta};
-use crate::trajectory::Loaded;
 use crate::trajectory::csv_table::{CsvColumn, CsvTable};
-use crate::trajectory::{NO_LANE, Recording, Track};
+use crate::trajectory::{Loaded, NO_LANE, Recording, Track};
 use lanesweep_model::plausibility::{Doubts, HELP, Implausible, Quantity};
 use lanesweep_support::atomic_file::folder_of;
 use lanesweep_support::{Error, Result};
@@ -260,7 +259,7 @@ fn report(
     let columns = [columns.velocity_x, columns.velocity_y, columns.y, columns.acceleration_x];
     for ((quantity, value), column) in CHECKED.into_iter().zip(*sample).zip(columns) {
         let place = || table.field(column).of(format!("vehicle {}", track.id)).to_string();
-        doubts.check(quantity, value, place).map_err(|problem| table.bad(column, problem, HELP))?;
+        doubts.check(quantity, value, place).map_err(|problem| table.bad(column, problem, HELP.as_str()))?;
     }
     Ok(())
 }

@@ -157,35 +157,3 @@ fn centres_by_position(samples: &[Lateral]) -> Vec<f64> {
     centres.truncate(MAX_LANES);
     if centres.is_empty() { vec![d[d.len() / 2]] } else { centres }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn driven(centres: &[f64], labels: bool) -> Vec<Lateral> {
-        let wander = |k: usize| 0.35 * libm::sin(k as f64 * 0.7) + 0.2 * libm::sin(k as f64 * 0.13);
-        let of = |lane: usize, centre: &f64| -> Vec<Lateral> {
-            let label = labels.then_some(lane as u32);
-            (0..400).map(|k| (centre + wander(k), label)).collect()
-        };
-        centres.iter().enumerate().flat_map(|(lane, centre)| of(lane, centre)).collect()
-    }
-
-    #[test]
-    fn lanes_are_found_with_and_without_names() {
-        let centres = [-1.8, -5.5, -9.1];
-        for labels in [true, false] {
-            let (lines, source) = lane_lines(&driven(&centres, labels), None).unwrap();
-            assert_eq!(source == BY_NAME, labels);
-            assert_eq!(lines.len(), 4);
-            for (line, expected) in lines.iter().zip([0.03, -3.65, -7.3, -10.93]) {
-                assert!((line - expected).abs() < 0.25, "{lines:?}");
-            }
-        }
-        let (lines, source) = lane_lines(&driven(&[-1.83, -5.49], false), Some(3.6576)).unwrap();
-        assert_eq!((lines, source), (vec![0.0, -3.6576, -7.3152], "bands of the width in the preset"));
-        // Nobody in the middle lane.
-        let (lines, _) = lane_lines(&driven(&[-1.8, -9.1], true), None).unwrap();
-        assert!(lines.len() == 4 && (lines[1] - -3.6).abs() < 0.25, "{lines:?}");
-    }
-}

@@ -36,11 +36,11 @@ use rows::{Columns, Rows};
 
 use super::Loaded;
 use super::highd::made_up;
-use super::inputs::files_of;
 use lanesweep_support::atomic_file::folder_of;
 use lanesweep_support::files::file_name;
+use lanesweep_support::files::files_of;
 use lanesweep_support::input_file::unpacked;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Names of recordings with this word are synthetic, because tables of tracks have no other place to say so.
 pub const SYNTHETIC: &str = "SYNTHETIC";
@@ -95,7 +95,7 @@ pub fn detect(path: &Path) -> Result<Option<Preset>> {
         && first == second
     {
         let problem = format!("it fits the presets {} and {}", a.name, b.name);
-        return Err(Error::input(Place::file(path), problem, "choose one by option `preset`"));
+        return Err(Error::input(Place::file(path), problem, format!("choose one by {}", option("preset"))));
     }
     Ok(best.into_iter().next().map(|(_, preset)| preset))
 }

@@ -6,10 +6,8 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::roles::{ColumnName, Role};
-use lanesweep_support::input_file;
 use lanesweep_support::plain_text::{nearest, sha256};
-use lanesweep_support::settings;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, input_file, settings};
 
 /// Columns by their meaning.
 pub(super) type NamedColumns = BTreeMap<Role, ColumnName>;

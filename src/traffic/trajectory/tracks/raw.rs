@@ -103,7 +103,7 @@ pub(super) struct FileFacts {
 /// Those of the files, with the place of a bad value.
 pub(super) fn read_table(file: &TrackFile, preset: &Preset) -> Result<(Vec<RawRecording>, FileFacts)> {
     let rows = Rows::open(&file.path)?;
-    let mut columns = Columns::of(&preset.columns, rows.header(), &preset.none);
+    let columns = Columns::of(&preset.columns, rows.header(), &preset.none);
     check_columns(&rows, &columns, preset)?;
     let present = Role::ALL.into_iter().filter(|role| columns.has(*role));
     let mut roles: Vec<(Role, String)> = present.map(|role| (role, columns.name(role).to_owned())).collect();
@@ -113,7 +113,7 @@ pub(super) fn read_table(file: &TrackFile, preset: &Preset) -> Result<(Vec<RawRe
     let has_frames = columns.has(Role::Frame)
         && (preset.frame_rate_hz.is_some() || preset.recording.is_some() || !columns.has(Role::Time));
     let mut collecting = Collecting { axes: preset.axes, id: file.id.clone(), has_frames, ..Collecting::default() };
-    let checksum = rows.each(&mut columns, |row| collecting.add(row))?;
+    let checksum = rows.each(&columns, |row| collecting.add(row))?;
     let mut recordings = collecting.recordings;
     recordings.retain(|recording| !recording.vehicles.is_empty());
     if let Some(found) = columns.found_time() {
@@ -289,8 +289,8 @@ fn read_meta(
         return Err(Error::input(Place::file(&beside), problem, "add it, or use a preset without it"));
     }
     let rows = Rows::open(&beside)?;
-    let mut columns = Columns::of(&meta.columns, rows.header(), &preset.none);
-    rows.each(&mut columns, each)
+    let columns = Columns::of(&meta.columns, rows.header(), &preset.none);
+    rows.each(&columns, each)
 }
 
 /// Adds classes, sizes and directions of the vehicles from their own file.

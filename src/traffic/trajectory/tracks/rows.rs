@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use super::is_parquet;
 use super::roles::{ColumnName, Role};
-use super::times::{DATES, FoundTime, time_of_text, unit_of_time};
+use super::times::{FoundTime, time_of_text, unit_of_time};
 use crate::trajectory::csv_table::{CsvColumn, CsvFormat, CsvTable, FileChecksum};
 use crate::trajectory::number;
 use lanesweep_support::table::{Cell as TableCell, TableFormat, TableReader};
@@ -166,7 +166,7 @@ impl Rows {
     /// Those of the file and of `each`.
     pub(super) fn each(
         self,
-        columns: &mut Columns,
+        columns: &Columns,
         mut each: impl FnMut(&SampleRow) -> Result<()>,
     ) -> Result<FileChecksum> {
         match self.source {
@@ -183,12 +183,6 @@ impl Rows {
                     let problem = "the cells of a column are lists; a row is one vehicle at one time";
                     let help = "make such a table in Python: `lanesweep.tracks.lists`, or `swiftraj`";
                     return Err(Error::input(Place::file(&self.path), problem, help));
-                }
-                if let Some((at, factor)) = &mut columns.at[Role::Time as usize]
-                    && reader.rows.has_instants(*at)
-                {
-                    columns.found_time.set(Some(DATES));
-                    *factor = 1.0;
                 }
                 let mut order = [0; Role::ALL.len()];
                 let present = (0..order.len()).filter(|role| columns.at[*role].is_some());
@@ -324,15 +318,4 @@ const A_POINT: &str = "a finite number with a decimal point (decimal commas are 
 fn bad(place: Place, found: &str, expected: &str) -> Error {
     let shown: String = found.chars().take(40).flat_map(char::escape_debug).collect();
     Error::input(place, format!("`{shown}` is not {expected}"), "correct the value, or name it in `none` of the preset")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_are_compared_without_case_and_marks() {
-        assert!(letters("Vehicle-ID") == letters("vehicle_id") && letters("xloc_kf") == letters("XLoc KF"));
-        assert!(letters("vehicle_idx") != letters("vehicle_id"));
-    }
 }

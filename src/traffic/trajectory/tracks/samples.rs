@@ -144,26 +144,3 @@ pub(super) fn between(before: &Sample, after: &Sample, part: f64) -> Sample {
         }
     })
 }
-
-#[cfg(test)]
-mod tests {
-    use proptest::prelude::*;
-
-    use super::*;
-
-    proptest! {
-        #[test]
-        fn every_number_keeps_its_bits(rows in prop::collection::vec((any::<f64>(), 0u32..2), 0..60)) {
-            let row = |(any, few): &(f64, u32)| -> Sample {
-                std::array::from_fn(|at| [*any, f64::from(*few) * -0.0, f64::from(*few), f64::NAN][at % 4])
-            };
-            let samples: Vec<Sample> = rows.iter().map(row).collect();
-            let stored: Samples = samples.iter().collect();
-            prop_assert_eq!(stored.len(), samples.len());
-            let bits = |of: &Sample| of.map(|value| if value.is_nan() { 1 } else { value.to_bits() });
-            for (stored, sample) in stored.to_vec().iter().zip(&samples) {
-                prop_assert_eq!(bits(stored), bits(sample));
-            }
-        }
-    }
-}

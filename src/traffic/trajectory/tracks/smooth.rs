@@ -51,29 +51,3 @@ pub(super) fn savitzky_golay(values: &[f64], window: usize, rate_hz: f64) -> [Ve
     }
     result
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_cubic_is_left_as_it_is_and_noise_is_reduced() {
-        let rate_hz = 25.0;
-        let cubic = |k: usize| {
-            let t = k as f64 / rate_hz;
-            [5.0 + 30.0 * t - t * t + 0.2 * t * t * t, 30.0 - 2.0 * t + 0.6 * t * t, -2.0 + 1.2 * t]
-        };
-        let values: Vec<f64> = (0..60).map(|k| cubic(k)[0]).collect();
-        let smooth = savitzky_golay(&values, 25, rate_hz);
-        for k in 0..60 {
-            for (series, exact) in smooth.iter().zip(cubic(k)) {
-                assert!((series[k] - exact).abs() < 1e-6, "{k}");
-            }
-        }
-        let noisy: Vec<f64> = (0..60).map(|k| 30.0 * k as f64 / rate_hz + 0.1 * libm::sin(k as f64 * 2.4)).collect();
-        let [_, speed, _] = savitzky_golay(&noisy, 25, rate_hz);
-        assert!(speed[10..50].iter().all(|v| (v - 30.0).abs() < 0.2));
-        assert!(central(&noisy, rate_hz).iter().any(|v| (v - 30.0).abs() > 1.0));
-        assert_eq!(savitzky_golay(&[1.0, 2.0, 3.0], 25, 1.0)[1], [1.0, 1.0, 1.0]);
-    }
-}

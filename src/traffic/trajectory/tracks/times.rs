@@ -4,7 +4,6 @@
 pub(super) type FoundTime = &'static str;
 /// `08:15:30.25`: it begins again at midnight.
 pub(super) const TIME_OF_DAY: FoundTime = "time of day";
-pub(super) const DATES: FoundTime = "dates";
 
 /// What a time of this size is, and its factor to seconds; `None` for seconds. No recording is from the year 5138 or later.
 pub(super) fn unit_of_time(value: f64) -> Option<(FoundTime, f64)> {
@@ -20,7 +19,7 @@ pub(super) fn unit_of_time(value: f64) -> Option<(FoundTime, f64)> {
 pub(super) fn time_of_text(text: &str) -> Option<(FoundTime, f64)> {
     let text = text.replace(',', ".");
     if let Some(seconds) = seconds_of_date(&text) {
-        return Some((DATES, seconds));
+        return Some(("dates", seconds));
     }
     let parts: Option<Vec<f64>> =
         text.split(':').map(|part| part.parse().ok().filter(|value: &f64| *value >= 0.0)).collect();
@@ -62,19 +61,4 @@ fn seconds_of_date(text: &str) -> Option<f64> {
     let days = era * 146_097 + of_era * 365 + of_era / 4 - of_era / 100 + of_year - 719_468;
     let of_day = 3600.0 * hours + 60.0 * minutes + seconds - offset_s;
     of_day.is_finite().then_some(days as f64 * 86_400.0 + of_day)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn dates_become_seconds() {
-        assert_eq!(seconds_of_date("1970-01-01T00:00:00Z"), Some(0.0));
-        assert_eq!(seconds_of_date("2024-10-07 06:00:00.5+00:00"), Some(1_728_280_800.5));
-        assert_eq!(seconds_of_date("2024-10-07 08:00:00.5+02:00"), Some(1_728_280_800.5));
-        for wrong in ["2024-10-07", "2024-13-07 06:00:00", "x", "2024-10-07 06", "2024-10-07 a:b:c", "-"] {
-            assert_eq!(seconds_of_date(wrong), None, "{wrong}");
-        }
-    }
 }

@@ -1,0 +1,7 @@
+//! Claims about what is computed, in this process: lanes, scenarios, densities, recordings.
+
+mod common;
+mod lanes;
+mod scenarios;
+mod statistics;
+mod traffic;

@@ -1,0 +1,16 @@
+//! The program as its users meet it, the book, and the repository itself.
+
+mod adding_a_model;
+mod book;
+mod check;
+mod check_sheet;
+mod check_tables;
+mod command_line;
+mod configuration;
+mod figures;
+mod help_examples;
+mod messages;
+mod report_page;
+mod report_width;
+mod shell;
+mod source_rules;

@@ -1,0 +1,16 @@
+//! Whole runs: parts, interruptions, kills, faults of the machine, repeats.
+
+mod against_recorded;
+mod external_replays;
+mod faults;
+mod interrupted;
+mod kills;
+mod map;
+mod mechanisms;
+mod mutations;
+mod nothing_is_lost;
+mod observed;
+mod parts;
+mod reruns;
+mod sampling;
+mod strange_files;
