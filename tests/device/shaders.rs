@@ -3,9 +3,11 @@
 
 use std::collections::BTreeSet;
 use std::mem::offset_of;
+use std::path::{Path, PathBuf};
 
 use crate::device::wgsl::{
-    Shape, constant, fields, float_operations, parse, unbounded_loops, uninitialized_in_loops, without_comments,
+    Shape, constant, fields, float_operations, function_names, parse, unbounded_loops, uninitialized_in_loops,
+    without_comments,
 };
 use lanesweep::engine::generated::{
     self, ATTEMPTS, ColumnBound, MAX_BOUNDS, MAX_PARAMETERS, NO_SLOT, Recipe, ReducedColumns,
@@ -380,6 +382,49 @@ fn a_variable_in_a_loop_that_begins_with_nothing_is_found() {
     assert!(uninitialized_in_loops(&body("var x: u32 = 0u;")).is_empty());
 }
 
+fn in_crate(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
+}
+
+/// Functions of the Rust file beside a shader, but for those without a twin.
+fn twin_functions(folder: &str, shader: &str, no_twin: &[&str]) -> Vec<String> {
+    let twin = in_crate(folder).join(shader).with_extension("rs");
+    let text = std::fs::read_to_string(&twin).unwrap_or_else(|e| panic!("{}: {e}", twin.display()));
+    let mut names = function_names(text.split("#[cfg(test)]").next().unwrap());
+    names.retain(|name| !no_twin.contains(&name.as_str()));
+    names
+}
+
+#[test]
+fn every_model_has_a_shader_with_the_functions_of_its_rust_file_in_their_order() {
+    // What only the host does, or batches of lanes alone; and `shader_constants` is what joins the two.
+    let no_twin = "default resolve bounds time_step_bounds attention abort_above_ttc_s reaction_and_margin_s safe_gap \
+                   intrusion_gap_m ignores check_steady shader_constants";
+    let no_twin: Vec<&str> = no_twin.split(' ').collect();
+    for model in ModelId::ALL {
+        let (file, shader) = driver_shader(model);
+        let names = twin_functions("src/model/driver", file, &no_twin);
+        // The demand of a view is part of the twin's `check`; promises are made where they pay.
+        let mut in_wgsl = function_names(shader);
+        in_wgsl.retain(|name| !["demand", "safe_gap", "ignores"].contains(&name.as_str()));
+        assert_eq!(names, in_wgsl, "{file} and its twin");
+        assert!(["initial", "check", "react"].iter().all(|required| names.contains(&(*required).to_owned())), "{file}");
+    }
+}
+
+#[test]
+fn the_fragments_of_sampling_have_the_functions_of_their_rust_files_in_their_order() {
+    // What makes the tables, which only the host does; and methods that only look up a row and call what has a twin.
+    let no_twin = ["normal_table", "inverse_normal_tail", "segment", "new", "table", "word", "directions"];
+    // Methods have the name of their type with them in WGSL.
+    for (file, shader) in RANDOM {
+        let name = Path::new(file).file_name().unwrap().to_str().unwrap();
+        let mut names = twin_functions("src/random", name, &no_twin);
+        names.iter_mut().filter(|name| *name == "words").for_each(|name| *name = "stream_words".to_owned());
+        assert_eq!(names, function_names(shader), "{file} and its twin");
+    }
+}
+
 #[test]
 fn the_fragments_of_sampling_do_only_what_devices_agree_on() {
     let tables = "@group(0) @binding(0) var<storage, read> normal_table: array<vec4<f32>>;\n";
@@ -395,6 +440,19 @@ fn the_fragments_of_sampling_do_only_what_devices_agree_on() {
 /// Names and texts of the files that pipelines are made of.
 fn shader_files() -> impl Iterator<Item = (&'static str, &'static str)> {
     SHARED.into_iter().chain(RANDOM).chain(GENERATOR).chain(TALLY).chain(ModelId::ALL.map(driver_shader))
+}
+
+#[test]
+fn every_shader_file_is_part_of_a_pipeline() {
+    let known: BTreeSet<String> = shader_files().map(|(name, _)| name.to_owned()).collect();
+    let mut found = BTreeSet::new();
+    for folder in ["", "shared/"] {
+        for entry in std::fs::read_dir(in_crate("shaders").join(folder)).unwrap() {
+            let name = entry.unwrap().file_name().into_string().unwrap();
+            found.extend(name.ends_with(".wgsl").then(|| format!("{folder}{name}")));
+        }
+    }
+    assert_eq!(found, known);
 }
 
 #[test]

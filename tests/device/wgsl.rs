@@ -65,6 +65,16 @@ pub fn without_comments(text: &str) -> String {
     text.lines().flat_map(|line| [line.split("//").next().unwrap(), "\n"]).collect()
 }
 
+/// Names of the functions of a Rust or WGSL text, in their order.
+pub fn function_names(text: &str) -> Vec<String> {
+    let code = without_comments(text);
+    let words = code.match_indices("fn ").filter(|(at, _)| !code[..*at].ends_with(|c: char| c.is_alphanumeric()));
+    let names = words.map(|(at, word)| {
+        code[at + word.len()..].chars().take_while(|c| c.is_ascii_alphanumeric() || *c == '_').collect::<String>()
+    });
+    names.filter(|name| !name.is_empty()).collect()
+}
+
 /// What the functions of a module do with floats.
 #[derive(Debug, Default)]
 pub struct FloatOperations {

@@ -370,6 +370,43 @@ fn a_cell_is_undecided_where_the_single_case_is() {
     assert!(undecided_cells(map, 0) > 0);
 }
 
+/// Every preset: a cell without a conflict is one whose single case `check` answers with the same word, from the same gap.
+#[test]
+fn a_cell_without_a_conflict_is_a_case_without_one() {
+    use lanesweep::run::check::{Answer, Check, Subject};
+    let mut compared = [0; 2];
+    for category in Category::ALL {
+        let profile = profile("un-r157");
+        for presets in Presets::ALL {
+            for preset in presets.of(category, &profile).unwrap() {
+                let models = [ModelId::Cchdm, ModelId::Fsm];
+                let grid = preset.grid;
+                let map = mapped(grid.clone(), &profile, &models);
+                for (at, &model) in models.iter().enumerate() {
+                    // A prime number of cells apart: all panels, gaps and speeds.
+                    for cell in (0..grid.cell_count()).step_by(499) {
+                        let point = grid.point(cell);
+                        let plain = point.plain_case(category, &profile).unwrap();
+                        let headway = Headway::GapM(grid.gap_m(cell, model, &profile));
+                        let (subject, profiles) = (Subject::plain(&plain, headway), vec![profile.clone()]);
+                        let check = Check { subject, profiles, models: vec![model] };
+                        let judged = check.run_without_boundaries().unwrap().remove(0);
+                        let outcome = map.outcome(at, cell, Criterion::Collision);
+                        let is_no_conflict = judged.verdicts.answer() == Answer::NoConflict;
+                        let says_so = matches!(outcome, CellOutcome::NoConflict | CellOutcome::FailByReaction);
+                        assert_eq!(is_no_conflict, says_so, "{}, {:?}", grid.name(), grid.values(cell));
+                        if outcome == CellOutcome::NoConflict {
+                            assert_eq!(outcome.label(), judged.verdicts.answer().label());
+                        }
+                        compared[usize::from(is_no_conflict)] += 1;
+                    }
+                }
+            }
+        }
+    }
+    assert!(compared.iter().all(|cases| *cases > 50), "{compared:?}");
+}
+
 /// Terminal, `map.json`, the sheet's legend and `cells.csv` count the same cells with the same words, for every preset. Cells
 /// of cut-outs without possible traffic count in no share.
 #[test]
