@@ -9,7 +9,7 @@ import numbers
 import os
 import sys
 import warnings
-from collections.abc import Callable, Iterator, KeysView, Mapping, Sequence, Set, ValuesView
+from collections.abc import Callable, Collection, Iterator, KeysView, Mapping, Sequence, Set, ValuesView
 from pathlib import Path
 from typing import Any
 
@@ -62,8 +62,6 @@ def progress() -> tuple[Callable[[str, int, int], None] | None, Callable[[], Non
     return move, close
 
 
-#: Parameters that hold further arguments.
-_GROUPS = ("options", "case")
 #: Arguments that take names with values.
 _TABLES = ("config", "panel", "set")
 
@@ -188,14 +186,20 @@ def _shown(value: Any) -> str:
     return json.dumps(str(value), ensure_ascii=False) if isinstance(value, (str, Path)) else repr(value)
 
 
-def run(function: str, arguments: Mapping[str, Any], *, default_out: str | None = None, path: Any = None) -> Result:
-    """Run a verb by the name of its function.
+#: Names of results in a temporary folder, without the argument `out`.
+_OUT = {"study": "study", "tracks": "tracks", "mine": "scenarios.jsonl", "fit": "densities", "sample": "sample", "map": "map"}
 
-    The files of the result are in the argument `out`, in a temporary `default_out`, or in `path`, which is an argument.
-    """
-    given = {name: value for name, value in arguments.items() if name not in _GROUPS}
-    for group in _GROUPS:
-        given |= arguments.get(group, {})
+
+def run(function: str, arguments: Mapping[str, Any]) -> Result:
+    """Run a verb by the name of its function."""
+    given = dict(arguments)
+    default_out, path = _OUT.get(function), given.get("folder")
+    if function == "tracks":
+        paths = given["paths"]
+        are_several = isinstance(paths, Collection) and not isinstance(paths, str) and len(paths) > 1
+        if paths is None or are_several:
+            # Figures of several recordings could have the same names.
+            default_out, path = None, None if are_several else given["convert"]
     if given.get("models") is not None:
         given["models"] = names_of(given["models"])
     plan = given.get("plan")

@@ -85,54 +85,9 @@ pub fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
     Ok(())
 }
 
-/// A text of the program in the words of Python: `--synth-seed`, or option `synth_seed`, is `synth_seed`. A command to
-/// repeat stays one.
-pub fn in_arguments(text: &str) -> String {
-    let of_line = |line: &str| if line.contains("lanesweep ") { line.to_owned() } else { flags_as_arguments(line) };
-    let text = text.split('\n').map(of_line).collect::<Vec<_>>().join("\n");
-    text.replace("option `headways`", "`thw`").replace("option `", "`").replace("`from`", "`from_`")
-}
-
-fn flags_as_arguments(line: &str) -> String {
-    let (mut out, mut rest) = (String::with_capacity(line.len()), line);
-    while let Some(at) = rest.find("--") {
-        let (before, flag) = rest.split_at(at);
-        let flag = &flag[2..];
-        let name = &flag
-            [..flag.find(|c: char| !c.is_ascii_lowercase() && !c.is_ascii_digit() && c != '-').unwrap_or(flag.len())];
-        let last = before.chars().next_back();
-        // Within a quoted command, such as `simulate --from`, and in names of files it is none.
-        let quoted = out.matches('`').count() + before.matches('`').count();
-        let is_within = quoted % 2 == 1 && last != Some('`');
-        let is_file = flag[name.len()..].strip_prefix('.').is_some_and(|end| end.starts_with(char::is_alphanumeric));
-        let is_part = last.is_some_and(|c| c.is_alphanumeric() || c == '-');
-        if name.is_empty() || name.starts_with('-') || is_part || is_within || is_file {
-            out += &rest[..at + 2];
-            rest = flag;
-            continue;
-        }
-        let mut after = &flag[name.len()..];
-        // The placeholder of the value: `--thw <LIST>`.
-        if let Some((_, beyond)) = [" <", "=<"].iter().find_map(|open| after.strip_prefix(open)?.split_once('>')) {
-            after = beyond.trim_start_matches("...");
-        }
-        let quote = last.filter(|c| ['`', '\''].contains(c));
-        let closed = quote.and_then(|quote| after.strip_prefix(quote));
-        let (before, mark) = match (quote, closed) {
-            (Some(quote), Some(_)) => (&before[..before.len() - quote.len_utf8()], "`"),
-            (Some(_), None) => (before, ""),
-            (None, _) => (before, "`"),
-        };
-        let keyword = if name == "from" { "_" } else { "" };
-        out.extend([before, mark, &name.replace('-', "_"), keyword, mark]);
-        rest = closed.unwrap_or(after);
-    }
-    out + rest
-}
-
 /// The exception of an error.
 pub fn exception(py: Python<'_>, error: &Error) -> PyErr {
-    let (problem, help) = (in_arguments(&error.to_string()), error.help().map(|help| in_arguments(&help)));
+    let (problem, help) = (error.to_string(), error.help());
     let text = match &help {
         Some(help) => format!("{problem}\n  help: {help}"),
         None => problem.clone(),

@@ -8,10 +8,12 @@ mod frame;
 mod limit_state;
 mod verb;
 
+use lanesweep::support::error::{Notation, write_options_as};
 use pyo3::prelude::*;
 
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    write_options_as(Notation::Argument);
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     error::add_to(module)?;
     module.add_class::<frame::Frame>()?;
@@ -20,7 +22,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<driver::Vehicle>()?;
     module.add_function(wrap_pyfunction!(verb::run, module)?)?;
     module.add_function(wrap_pyfunction!(verb::main, module)?)?;
-    module.add_function(wrap_pyfunction!(verb::arguments, module)?)?;
+    module.add_function(wrap_pyfunction!(verb::described, module)?)?;
     module.add_function(wrap_pyfunction!(verb::profile, module)?)?;
     module.add_function(wrap_pyfunction!(frame::frame_of_records, module)?)?;
     module.add_function(wrap_pyfunction!(frame::frame_of_columns, module)?)?;

@@ -15,7 +15,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::driver;
-use crate::error::{exception, in_arguments};
+use crate::error::exception;
 
 /// How often the calling thread looks for signals.
 const LOOK: Duration = Duration::from_millis(20);
@@ -119,7 +119,7 @@ fn pass_on(
 ) -> PyResult<()> {
     for (level, line) in embedded::take_messages() {
         if let Some(on_message) = on_message {
-            on_message.call1((level.as_str(), in_arguments(&line)))?;
+            on_message.call1((level.as_str(), line))?;
         }
     }
     if let Some(on_progress) = on_progress
@@ -178,13 +178,17 @@ pub fn main(py: Python<'_>, words: Vec<OsString>) -> u8 {
 #[pyfunction]
 pub fn profile<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
     let profile = lanesweep::model::profile::Profile::load(name).map_err(|error| exception(py, &error))?;
-    let text = serde_json::to_string(&profile);
-    let text = text.map_err(|error| exception(py, &Error::Internal(format!("a profile: {error}"))))?;
-    py.import("json")?.call_method1("loads", (text,))
+    parsed(py, serde_json::to_string(&profile))
 }
 
-/// Names of a function's arguments.
+/// What the program says of a function and its arguments, as nested dictionaries.
 #[pyfunction]
-pub fn arguments(py: Python<'_>, function: &str) -> PyResult<Vec<String>> {
-    embedded::arguments(function).map_err(|error| exception(py, &error))
+pub fn described<'py>(py: Python<'py>, function: &str) -> PyResult<Bound<'py, PyAny>> {
+    parsed(py, serde_json::to_string(&embedded::described(function).map_err(|error| exception(py, &error))?))
+}
+
+/// A record of the library as nested dictionaries.
+fn parsed<'py>(py: Python<'py>, record: serde_json::Result<String>) -> PyResult<Bound<'py, PyAny>> {
+    let text = record.map_err(|error| exception(py, &Error::Internal(format!("a record: {error}"))))?;
+    py.import("json")?.call_method1("loads", (text,))
 }

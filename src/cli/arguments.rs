@@ -5,11 +5,13 @@ use std::error::Error as _;
 use std::ffi::OsString;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
-use clap::{Arg, ArgMatches, Command};
+use clap::builder::StyledStr;
+use clap::{Arg, ArgAction, ArgMatches, Command};
+use serde::Serialize;
 
 use super::configured;
 use lanesweep_support::plain_text::nearest;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// The value of an argument.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -35,40 +37,92 @@ fn arguments_of(verb: &Command) -> impl Iterator<Item = &Arg> {
     verb.get_arguments().filter(move |arg| !printing.contains(&arg.get_id().as_str()))
 }
 
-/// Names of a function's arguments.
+/// What a verb says of itself, from which `python/tools/verbs.py` writes its function.
+#[derive(Debug, Serialize)]
+pub struct Described {
+    about: String,
+    arguments: Vec<Argument>,
+}
+
+/// What a flag or position says of itself.
+#[derive(Debug, Serialize)]
+struct Argument {
+    name: String,
+    help: String,
+    /// Name of its value; none if it is present or not.
+    value: Option<String>,
+    /// The only possible values.
+    words: Vec<String>,
+    is_position: bool,
+    is_required: bool,
+    is_repeated: bool,
+}
+
+/// Describes a function.
 ///
 /// # Errors
 /// [`Error::Usage`] for an unknown function.
-pub fn arguments(function: &str) -> Result<Vec<String>> {
-    Ok(arguments_of(&verb_of(function)?).map(|arg| arg.get_id().to_string()).collect())
+pub fn described(function: &str) -> Result<Described> {
+    let verb = verb_of(function)?;
+    let text = |long: Option<&StyledStr>, short: Option<&StyledStr>| long.or(short).map(ToString::to_string);
+    let describe = |arg: &Arg| Argument {
+        name: arg.get_id().to_string(),
+        help: text(arg.get_long_help(), arg.get_help()).unwrap_or_default(),
+        value: arg.get_action().takes_values().then(|| arg.get_value_names().unwrap_or_default().concat()),
+        words: arg.get_possible_values().iter().map(|word| word.get_name().to_owned()).collect(),
+        is_position: arg.is_positional(),
+        is_required: arg.is_required_set(),
+        is_repeated: matches!(arg.get_action(), ArgAction::Append),
+    };
+    let about = text(verb.get_long_about(), verb.get_about()).unwrap_or_default();
+    Ok(Described { about, arguments: arguments_of(&verb).map(describe).collect() })
 }
 
 /// Parses a call.
 ///
 /// # Errors
 /// [`Error::Usage`] with the argument.
-pub(super) fn parse(function: &str, given: Vec<(String, Given)>) -> Result<ArgMatches> {
+pub(super) fn parse(function: &str, given: &[(String, Given)]) -> Result<ArgMatches> {
     let verb = verb_of(function)?;
+    let error = match parsed(function, &verb, given.iter())? {
+        Ok(matches) => return Ok(matches),
+        Err(error) => error,
+    };
+    let refused = |without: &str| parsed(function, &verb, given.iter().filter(|(name, _)| name != without));
+    // Clap does not say which argument needs the one that is missing: the one without which none is.
+    let is_missing = error.kind() == ErrorKind::MissingRequiredArgument;
+    let needs = |(name, _): &&(String, Given)| is_missing && matches!(refused(name), Ok(Ok(_)));
+    Err(refusal(&verb, &error, given.iter().find(needs).map(|(name, _)| name.as_str())))
+}
+
+/// What clap says of a call.
+fn parsed<'a>(
+    function: &str,
+    verb: &Command,
+    given: impl Iterator<Item = &'a (String, Given)>,
+) -> Result<clap::error::Result<ArgMatches>> {
     let mut flags: Vec<OsString> = vec!["lanesweep".into(), verb.get_name().into()];
     let mut positions: Vec<OsString> = vec!["--".into()];
     for (name, value) in given {
-        let refused = |problem: String, help: &str| Err(Error::usage(Place::item(format!("`{name}`")), problem, help));
-        let Some(arg) = arguments_of(&verb).find(|arg| arg.get_id() == name.as_str()) else {
-            let names: Vec<&str> = arguments_of(&verb).map(|arg| arg.get_id().as_str()).collect();
-            let near = nearest(&name, names.iter().copied(), 0.7);
+        let refused = |problem: String, help: &str| Err(Error::usage(Place::item(option(name)), problem, help));
+        let Some(arg) = arguments_of(verb).find(|arg| arg.get_id() == name.as_str()) else {
+            let names: Vec<&str> = arguments_of(verb).map(|arg| arg.get_id().as_str()).collect();
+            let near = nearest(name, names.iter().copied(), 0.7);
             let help = near.map_or(format!("there are {}", names.join(", ")), |near| format!("did you mean `{near}`?"));
             return refused(format!("{function} has no such argument"), &help);
         };
         let flag = arg.get_long().map(|long| format!("--{long}"));
         match (value, flag, arg.get_action().takes_values()) {
-            (Given::Flag(is_present), Some(flag), false) => flags.extend(is_present.then(|| flag.into())),
+            (Given::Flag(is_present), Some(flag), takes_values) if !takes_values || needs_no_value(arg) => {
+                flags.extend(is_present.then(|| flag.into()));
+            }
             (Given::Flag(is_present), ..) => {
-                let shown = if is_present { "True" } else { "False" };
+                let shown = if *is_present { "True" } else { "False" };
                 return refused(format!("{shown} is not a value of it"), "give a value, or leave it out");
             }
             (Given::Words(_), _, false) => return refused("it is True or False".to_owned(), "give one of the two"),
-            (Given::Words(words), None, true) => positions.extend(words),
-            (Given::Words(words), Some(flag), true) => flags.extend(words.into_iter().map(|word| {
+            (Given::Words(words), None, true) => positions.extend(words.iter().cloned()),
+            (Given::Words(words), Some(flag), true) => flags.extend(words.iter().map(|word| {
                 let mut text = OsString::from(format!("{flag}="));
                 text.push(word);
                 text
@@ -76,15 +130,20 @@ pub(super) fn parse(function: &str, given: Vec<(String, Given)>) -> Result<ArgMa
         }
     }
     flags.extend(positions);
-    configured::command().try_get_matches_from(flags).map_err(|error| refusal(&verb, &error))
+    Ok(configured::command().try_get_matches_from(flags))
 }
 
-/// An error of the command line in the words of a call.
-fn refusal(verb: &Command, error: &clap::Error) -> Error {
+/// Whether an argument that takes values has a meaning without one.
+fn needs_no_value(arg: &Arg) -> bool {
+    arg.get_num_args().is_some_and(|number| number.min_values() == 0)
+}
+
+/// An error of the command line in the words of a call; `needing` is the argument that needs the missing one.
+fn refusal(verb: &Command, error: &clap::Error, needing: Option<&str>) -> Error {
     // Clap names an argument as its usage shows it.
     let name = |shown: &String| {
         let arg = verb.get_arguments().find(|arg| arg.to_string() == *shown);
-        format!("`{}`", arg.map_or(shown.as_str(), |arg| arg.get_id().as_str()))
+        option(arg.map_or(shown.as_str(), |arg| arg.get_id().as_str()))
     };
     let texts = |kind| match error.get(kind) {
         Some(ContextValue::String(one)) => vec![one.clone()],
@@ -93,6 +152,11 @@ fn refusal(verb: &Command, error: &clap::Error) -> Error {
     };
     let names = |kind| texts(kind).iter().map(name).collect::<Vec<_>>().join(", ");
     let value = texts(ContextKind::InvalidValue).concat();
+    let invalid = names(ContextKind::InvalidArg);
+    if let Some(needing) = needing {
+        let help = format!("add {invalid}, or leave it out");
+        return Error::usage(Place::item(option(needing)), format!("it needs {invalid}"), help);
+    }
     let (problem, help) = match (error.kind(), error.source()) {
         (ErrorKind::ArgumentConflict, _) => {
             let problem = format!("it cannot be used with {}", names(ContextKind::PriorArg));
@@ -108,5 +172,5 @@ fn refusal(verb: &Command, error: &clap::Error) -> Error {
             (format!("there is no `{value}`"), format!("use one of {known}"))
         }
     };
-    Error::usage(Place::item(names(ContextKind::InvalidArg)), problem, help)
+    Error::usage(Place::item(invalid), problem, help)
 }

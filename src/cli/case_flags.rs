@@ -17,7 +17,7 @@ use lanesweep_run::check::Subject;
 use lanesweep_run::reopen::TracedCase;
 use lanesweep_support::input_file::{self, plain_name};
 use lanesweep_support::table::{NameUnit, TableFormat, TableReader};
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// A case in flags: one per number of a case.
 #[derive(Debug, Clone, Default)]
@@ -165,7 +165,7 @@ impl GivenCase {
         self.located(self.parameters.check_start())?;
         let start = gap.map(Headway::GapM).or(thw.map(Headway::thw));
         self.located(start.ok_or_else(|| {
-            let help = "give option `gap` in metres or option `thw` in seconds";
+            let help = format!("give {} in metres or {} in seconds", option("gap"), option("thw"));
             Error::usage(Place::item("gap, thw"), "the initial distance is missing", help)
         }))
     }
@@ -216,7 +216,7 @@ pub(super) struct GivenCases {
 
 impl GivenCases {
     pub(super) fn open(path: &Path) -> Result<GivenCases> {
-        let format = TableFormat::of(&plain_name(path), &[TableFormat::Csv, TableFormat::Parquet], "--table")?;
+        let format = TableFormat::of(&plain_name(path), &[TableFormat::Csv, TableFormat::Parquet], &option("table"))?;
         let rows = ParameterRows::new(TableReader::open(path, format)?)?;
         Ok(GivenCases { rows, row: 0, lines: HashMap::new(), doubled: HashMap::new() })
     }
@@ -264,7 +264,7 @@ pub(super) fn from_table(path: &Path, row: Option<usize>) -> Result<GivenCase> {
     }
     let found = if wanted == 0 { None } else { table.next()? }.ok_or_else(missing)??;
     if row.is_none() && table.next()?.is_some() {
-        let help = "name one: --row N, from 1 after the header";
+        let help = format!("name one: {}, from 1 after the header", option("row = N"));
         return Err(Error::usage(Place::file(path), "the table has several cases", help));
     }
     Ok(found)

@@ -13,14 +13,14 @@ use super::{COMMIT, Exit, Output};
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::plausibility::Doubts;
 use lanesweep_model::profile::Profile;
-use lanesweep_model::scenario::{Category, Scenario};
+use lanesweep_model::scenario::Scenario;
 use lanesweep_report::case_identity::CaseIdentity;
 use lanesweep_report::case_sheet::CaseSheet;
-use lanesweep_run::check::{Check as Checked, Subject};
+use lanesweep_run::check::{Check as Checked, Subject, retain_applicable};
 use lanesweep_support::files::{check_output, write_atomically};
 use lanesweep_support::input_file::{self, plain_name};
 use lanesweep_support::table::TableFormat;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Default profiles; the first one decides.
 const PROFILES: [&str; 6] = ["un-r157", "eu-2022-1426", "eu-2022-1426-standing", "jrc-2021", "paper", "paper-fit"];
@@ -98,7 +98,7 @@ impl Check {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         configured.refuse_assigned(
             "has no effect on a check",
-            "leave it out; --profiles names the profiles, which hold the time step",
+            &format!("leave it out; {} names the profiles, which hold the time step", option("profiles")),
         )?;
         self.guard_outputs()?;
         let names = if self.profiles.is_empty() { PROFILES.map(str::to_owned).to_vec() } else { self.profiles.clone() };
@@ -119,13 +119,8 @@ impl Check {
             return table.run(configured, self.format);
         }
         let request = self.request(&profiles[0])?;
-        // A profile that only adds its own cut-in clause does not apply to other cases.
-        if self.profiles.is_empty() && request.subject.category() != Category::CutIn {
-            let first = profiles[0].clone();
-            let is_first = |p: &Profile| {
-                (&p.frame, &p.cchdm, &p.rss, &p.fsm) == (&first.frame, &first.cchdm, &first.rss, &first.fsm)
-            };
-            profiles.retain(|profile| profile.name == first.name || !is_first(profile));
+        if self.profiles.is_empty() {
+            retain_applicable(&mut profiles, request.subject.category());
         }
         let check = Checked { subject: request.subject, profiles, models };
         let judgements = check.run()?;
@@ -163,28 +158,29 @@ impl Check {
     /// Refuses flags of one case for a whole table, and flags of a table for one case.
     fn guard_flags(&self, table: Option<&Path>) -> Result<()> {
         let of_one =
-            [("--sheet", self.sheet.is_some()), ("--date", self.date.is_some()), ("--author", self.author.is_some())];
-        let of_tables = [("--rows", self.rows.is_some()), ("--nominal", self.nominal)];
+            [("sheet", self.sheet.is_some()), ("date", self.date.is_some()), ("author", self.author.is_some())];
+        let of_tables = [("rows", self.rows.is_some()), ("nominal", self.nominal)];
+        let row = option("row = N");
         let given =
             |flags: &[(&'static str, bool)]| flags.iter().find(|(_, is_given)| *is_given).map(|(flag, _)| *flag);
         let (flag, problem, help) = match table {
             Some(path) if self.profiles.len() > 1 => (
-                Some("--profiles"),
+                Some("profiles"),
                 format!("{} is judged with all its rows, under one profile", path.display()),
-                "name one profile, or choose a row: --row N",
+                format!("name one profile, or choose a row: {row}"),
             ),
             Some(path) => (
                 given(&of_one),
                 format!("it shows one case, and {} is judged with all its rows", path.display()),
-                "choose a row: --row N, from 1 after the header",
+                format!("choose a row: {row}, from 1 after the header"),
             ),
             None => (
                 given(&of_tables),
                 "it is of a table of cases, and this is one case".to_owned(),
-                "give a table (.csv, .parquet) without --row, or leave it out",
+                format!("give a table (.csv, .parquet) without {}, or leave it out", option("row")),
             ),
         };
-        flag.map_or(Ok(()), |flag| Err(Error::usage(Place::item(flag), problem, help)))
+        flag.map_or(Ok(()), |flag| Err(Error::usage(Place::option(flag), problem, help)))
     }
 
     fn request(&self, profile: &Profile) -> Result<CheckRequest> {
@@ -196,7 +192,7 @@ impl Check {
         match (ending.to_str().unwrap_or_default(), &self.scenario) {
             ("toml", None) if self.row.is_some() => {
                 let problem = format!("{origin} is one case and has no rows");
-                Err(Error::usage(Place::item("--row"), problem, "leave it out, or give a table (.csv, .parquet)"))
+                Err(Error::usage(Place::option("row"), problem, "leave it out, or give a table (.csv, .parquet)"))
             }
             ("toml", None) => self.of_flags(from_toml(path)?, profile, origin),
             ("csv" | "parquet", None) => {
@@ -210,7 +206,7 @@ impl Check {
                 self.of_scenario(found, format!("{id} of {origin}"), incomplete)
             }
             ("jsonl", None) => {
-                let help = "name one: --scenario ID";
+                let help = format!("name one: {}", option("scenario = ID"));
                 Err(Error::usage(Place::file(path), "a scenario file has many scenarios", help))
             }
             ("xosc", _) => {
@@ -219,7 +215,7 @@ impl Check {
             }
             (_, Some(_)) => {
                 let help = "give a .jsonl, .csv or .parquet file of scenarios";
-                Err(Error::usage(Place::item("--scenario"), format!("{origin} has no scenarios"), help))
+                Err(Error::usage(Place::option("scenario"), format!("{origin} has no scenarios"), help))
             }
             _ => {
                 let help = "give a .toml, .csv, .parquet or .jsonl file";
@@ -231,7 +227,7 @@ impl Check {
     fn of_flags(&self, file: GivenCase, profile: &Profile, origin: String) -> Result<CheckRequest> {
         let given = self.case.over(file);
         if !given.says_a_case() {
-            let help = "give a case (--category, --ego-speed, …) or a FILE";
+            let help = format!("give a case ({}, {}, …) or a file", option("category"), option("ego_speed"));
             return Err(Error::usage(Place::item("lanesweep check"), "there is nothing to check", help));
         }
         let mut doubts = Doubts::new(self.plausibility.policy());
@@ -245,8 +241,8 @@ impl Check {
         if self.case.says_more_than_a_start() {
             return Err(Error::usage(
                 Place::item(origin),
-                "the scenario is a complete case: the other flags would be ignored",
-                "keep --gap or --thw, and leave out the other flags of a case",
+                "the scenario is a complete case: the others would be ignored",
+                format!("keep {} or {}, and leave out the other options of a case", option("gap"), option("thw")),
             ));
         }
         let is_synthetic = scenario.synthetic;
@@ -257,13 +253,13 @@ impl Check {
     /// Outputs must have the right file ending.
     fn guard_outputs(&self) -> Result<()> {
         if let Some(path) = &self.rows {
-            TableFormat::of(path, &TableFormat::EVERY, "--rows")?;
+            TableFormat::of(path, &TableFormat::EVERY, &option("rows"))?;
             check_output(path)?;
         }
         let Some(path) = &self.sheet else { return Ok(()) };
         if path.extension().is_none_or(|found| !found.eq_ignore_ascii_case("html")) {
             let problem = format!("{} does not end in .html", path.display());
-            return Err(Error::usage(Place::item("--sheet"), problem, "give a name that ends in .html"));
+            return Err(Error::usage(Place::option("sheet"), problem, "give a name that ends in .html"));
         }
         check_output(path)
     }

@@ -5,7 +5,6 @@ use std::collections::BTreeSet;
 use std::time::Instant;
 
 use clap::builder::{PossibleValue, PossibleValuesParser};
-use clap::error::{ContextKind, ContextValue};
 use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, FromArgMatches};
 use indicatif::ProgressBar;
@@ -19,7 +18,7 @@ use lanesweep_engine::{BackendChoice, DeviceName, Executor, OpenBackend};
 use lanesweep_model::profile::Profile;
 use lanesweep_report::host::{Host, SettingRecord};
 use lanesweep_support::plain_text::nearest;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// The configuration of a run, and what every verb needs besides.
 #[derive(Debug, Clone)]
@@ -77,45 +76,6 @@ const OF_THE_PLAN: [&str; 9] = [
     "run.profile",
     "run.dt_s",
 ];
-
-/// Flags of earlier versions, with the keys that replaced them.
-const REMOVED: [(&str, &str); 12] = [
-    ("--bandwidth-rule", "fit.bandwidth_rule=RULE"),
-    ("--closing", "map.closing=true"),
-    ("--compare-reference", "study.compare_reference=true"),
-    ("--interval", "sample.interval=KIND"),
-    ("--keep-plan", "study.keep_plan=WHEN"),
-    ("--native-gap", "map.native_gap=true"),
-    ("--points", "sample.points=KIND"),
-    ("--reference", "study.reference=true' or '--config map.reference=true"),
-    ("--stop-after", "run.stop_after_s=SECONDS"),
-    ("--synth-duration", "generator.duration_s=SECONDS"),
-    ("--synth-seed", "generator.seed=N"),
-    ("--threshold-units", "verify.threshold_units=N"),
-];
-
-/// Verbs of earlier versions, with what replaced them.
-const REMOVED_VERBS: [(&str, &str); 2] =
-    [("export", "lanesweep simulate … --xosc DIR"), ("synth", "lanesweep tracks --convert DIR")];
-
-/// Adds what replaced a removed flag or verb to the error about it.
-pub(super) fn name_replacement(error: &mut clap::Error) {
-    let of = |kind| match error.get(kind) {
-        Some(ContextValue::String(word)) => word.as_str(),
-        _ => "",
-    };
-    let (flag, verb) = (of(ContextKind::InvalidArg), of(ContextKind::InvalidSubcommand));
-    let key = REMOVED.iter().find(|(removed, _)| flag == *removed).map(|(_, key)| format!("--config {key}"));
-    let verb = || REMOVED_VERBS.iter().find(|(removed, _)| verb == *removed).map(|(_, now)| (*now).to_owned());
-    if let Some(now) = key.or_else(verb) {
-        // Similar words, and their use, are not meant.
-        for kind in [ContextKind::SuggestedArg, ContextKind::SuggestedSubcommand, ContextKind::Usage] {
-            error.remove(kind);
-        }
-        let tip = format!("write '{now}' instead").into();
-        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip]));
-    }
-}
 
 /// The command line, with `--config` for every verb and the flags that set keys.
 pub(super) fn command() -> Command {
@@ -333,7 +293,7 @@ impl Configured {
     /// [`Error::Usage`].
     pub(super) fn refuse_with_plan(&self) -> Result<()> {
         let are_files_typed = std::env::var_os(FILE_VARIABLE).is_none();
-        self.refuse_lane_keys(are_files_typed, "is decided by the plan (--plan)", "leave it out, or make another plan")
+        self.refuse_lane_keys(are_files_typed, &format!("is decided by the plan ({})", option("plan")), "leave it out, or make another plan")
     }
 
     /// Refuses `--config KEY=VALUE` about lanes where `why` says that it has no effect. Files are allowed, because
@@ -373,7 +333,7 @@ fn layers(typed: &[Assignment]) -> Result<Layers> {
     if let Some(Assignment::File(path)) = typed.iter().find(is_neither) {
         let problem = format!("`{}` is neither KEY=VALUE nor an existing file", path.display());
         let help = "write a key with its value, such as run.dt_s=0.05, or the path of a TOML file";
-        return Err(Error::usage(Place::item("--config"), problem, help));
+        return Err(Error::usage(Place::option("config"), problem, help));
     }
     check_variables(&Key::all())?;
     Layers::read(typed, std::env::var_os(FILE_VARIABLE).as_deref())
@@ -394,7 +354,8 @@ fn check_variables(keys: &[Key]) -> Result<()> {
     for name in names.iter().filter(|name| *name != FILE_VARIABLE) {
         let Some(rest) = name.strip_prefix("LANESWEEP_") else { continue };
         if let Some(key) = keys.iter().find(|key| key.name.replace('.', "_").eq_ignore_ascii_case(rest)) {
-            tracing::warn!("the variable {name} is not read: write --config {}=VALUE, or a file", key.name);
+            let config = option(&format!("config = {}=VALUE", key.name));
+            tracing::warn!("the variable {name} is not read: write {config}, or a file");
         } else if nearest(rest, FILE_VARIABLE.strip_prefix("LANESWEEP_"), 0.85).is_some() {
             let help = format!("did you mean `{FILE_VARIABLE}`, which names a configuration file?");
             return Err(Error::usage(Place::item(name.clone()), "there is no such variable", help));
@@ -458,7 +419,7 @@ impl Configured {
         let run = &self.settings.run;
         if run.backend == BackendChoice::Gpu || run.device.is_some() {
             let problem = "binary64 is computed on the CPU; a device computes in binary32";
-            let help = "choose option `backend = cpu`, or leave out the key `reference`";
+            let help = format!("choose {}, or leave out the key `reference`", option("backend = cpu"));
             return Err(Error::usage(Place::item("reference"), problem, help));
         }
         Ok(OpenBackend::reference().with_cancel(CANCEL.clone()))

@@ -106,7 +106,7 @@ pub(super) fn start_log(verbosity: Verbosity) {
         .log_internal_errors(false)
         // A message is one line, whatever characters a file name has.
         .fmt_fields(debug_fn(|out, field, value| match field.name() {
-            "message" => write!(out, "{}", shown_in_line(&with_flags(&cut_names(&format!("{value:?}"))))),
+            "message" => write!(out, "{}", shown_in_line(&cut_names(&format!("{value:?}")))),
             name => write!(out, "{name}={}", shown_in_line(&format!("{value:?}"))),
         }))
         .with_ansi(io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none())
@@ -247,37 +247,6 @@ fn remaining(bound: &str, measured: Duration, left: Duration) -> String {
     }
 }
 
-/// Option fields whose flag has another name. All others use the field's name with dashes.
-const OTHER_FLAGS: [(&str, &str); 2] = [("headways", "thw"), ("model", "models")];
-
-/// The flag of a field, without its leading dashes.
-fn flag_of(field: &str) -> String {
-    let other = OTHER_FLAGS.iter().find(|(name, _)| *name == field);
-    other.map_or_else(|| field.replace('_', "-"), |(_, flag)| (*flag).to_owned())
-}
-
-/// Replaces marked fields in a text of the library by their flags: `--dt` for option `dt`, `--backend cpu` for option
-/// `backend = cpu`.
-fn with_flags(text: &str) -> String {
-    let (mut out, mut rest) = (String::with_capacity(text.len()), text);
-    while let Some((before, marked)) = rest.split_once("option `") {
-        let (option, after) = marked.split_once('`').unwrap_or(("", marked));
-        let (field, value) = option.split_once(" = ").map_or((option, None), |(field, value)| (field, Some(value)));
-        let is_field = !field.is_empty() && field.bytes().all(|b| b.is_ascii_lowercase() || b == b'_');
-        out += before;
-        rest = if is_field {
-            out += "--";
-            out += &flag_of(field);
-            value.iter().for_each(|value| out.extend([" ", value]));
-            after
-        } else {
-            out += "option `";
-            marked
-        };
-    }
-    out + rest
-}
-
 /// Warns about skipped input, with help.
 pub(super) fn warn<'a>(errors: impl IntoIterator<Item = &'a Error>) {
     errors.into_iter().for_each(|error| tracing::warn!("{error}; {}", error.help().unwrap_or_default()));
@@ -299,11 +268,10 @@ fn unbroken(text: &str) -> String {
 /// Prints an error with its help on stderr.
 pub(super) fn complain(error: &Error) {
     if is_captured() {
-        // In the words of the library.
         capture(Level::ERROR, &format!("{error}; {}", error.help().unwrap_or_default()));
         return;
     }
-    let part = |text: &str| unbroken(&shown(&with_flags(text)));
+    let part = |text: &str| unbroken(&shown(text));
     let _ = miette::set_hook(Box::new(|_| Box::new(miette::MietteHandlerOpts::new().break_words(false).build())));
     let report = Diagnostic { text: part(&error.to_string()), help: error.help().map(|help| part(&help)) };
     let back = |c: char| (c as u32).checked_sub(WHOLE).and_then(char::from_u32).unwrap_or(c);
@@ -324,7 +292,7 @@ pub(super) fn refuse(error: &clap::Error) -> Result<Exit> {
         };
     }
     let text = error.to_string();
-    let mut safe = shown(&with_flags(&text)).into_owned();
+    let mut safe = shown(&text).into_owned();
     for (_, value) in error.context() {
         if let ContextValue::String(value) = value
             && let Cow::Owned(short) = cut(&shown(value))

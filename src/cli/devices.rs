@@ -4,7 +4,7 @@ use clap::Args;
 
 use super::Output;
 use super::format::FormatFlag;
-use lanesweep_support::Result;
+use lanesweep_support::{Result, option};
 
 /// List the compute devices and the one that is used
 ///
@@ -33,8 +33,8 @@ impl Devices {
                 text += NOTHING;
             }
             text + &match auto {
-                Some(index) => format!("--backend auto selects device {index}.\n"),
-                None => "--backend auto selects the CPU: there is no GPU.\n".to_owned(),
+                Some(index) => format!("{} selects device {index}.\n", option("backend = auto")),
+                None => format!("{} selects the CPU: there is no GPU.\n", option("backend = auto")),
             }
         };
         let json = || lanesweep_report::records::document(&serde_json::json!({"devices": cards, "auto": auto}));

@@ -3,7 +3,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 
-pub use super::arguments::{Given, arguments};
+pub use super::arguments::{Given, described};
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::signals::CANCEL;
@@ -22,7 +22,7 @@ pub const STACK_BYTES: usize = 8 << 20;
 pub fn run(function: &str, call: String, given: Vec<(String, Given)>) -> Result<Output> {
     alone(|| {
         let result = without_panic(|| {
-            let (cli, configured) = Configured::of(&super::arguments::parse(function, given)?, call)?;
+            let (cli, configured) = Configured::of(&super::arguments::parse(function, &given)?, call)?;
             let requested = configured.settings.run.threads;
             let pool = pool_of(requested)?.stack_size(STACK_BYTES);
             let pool = pool.build().map_err(|error| not_started(requested, &error))?;

@@ -20,7 +20,7 @@ use lanesweep_support::error::push_once;
 use lanesweep_support::files::{check_output, file_name, make_folder_of};
 use lanesweep_support::readable::counted;
 use lanesweep_support::run_folder::RunFolder;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// How are the parameters of scenarios distributed?
 ///
@@ -119,9 +119,9 @@ impl Fit {
         let single = self.is_single();
         if single && ids.len() != 1 {
             return Err(Error::usage(
-                Place::item("--out"),
+                Place::option("out"),
                 format!("{} is one file, but {} densities are fitted", self.out.display(), ids.len()),
-                "give a folder, or choose one with --parameterizations",
+                format!("give a folder, or choose one with {}", option("parameterizations")),
             ));
         }
         let name = |id: &Parameterization| match single {

@@ -45,7 +45,8 @@ use configured::Configured;
 use console::Verbosity;
 
 use lanesweep_support::input_file::guarded;
-use lanesweep_support::{Error, Result};
+use lanesweep_support::error::{Notation, write_options_as};
+use lanesweep_support::{Error, Result, option};
 
 #[derive(Parser)]
 #[command(
@@ -128,12 +129,10 @@ pub fn main() -> ExitCode {
 /// Like [`main`], with the words after the program's name. For a process that does nothing else: it handles signals and
 /// starts the global thread pool.
 pub fn main_with(words: &[OsString]) -> Exit {
+    write_options_as(Notation::Flag);
     let matches = match configured::command().try_get_matches_from(with_program_name(words)) {
         Ok(matches) => matches,
-        Err(mut error) => {
-            configured::name_replacement(&mut error);
-            return run_and_report(|| console::refuse(&error));
-        }
+        Err(error) => return run_and_report(|| console::refuse(&error)),
     };
     if let Ok(common) = Common::from_arg_matches(&matches) {
         console::start_log(common.verbosity());
@@ -207,7 +206,7 @@ fn pool_of(requested: Option<usize>) -> Result<rayon::ThreadPoolBuilder> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let useful = THREADS_PER_CORE * cores;
     if let Some(requested) = requested.filter(|requested| *requested > useful) {
-        tracing::info!("--threads {requested}: {useful} are started, {THREADS_PER_CORE} per logical core");
+        tracing::info!("{}: {useful} are started, {THREADS_PER_CORE} per logical core", threads(requested));
     }
     let count = requested.map(|requested| requested.min(useful));
     // If memory ran out after some threads had started, an allocation in one of them would end the process.
@@ -228,7 +227,12 @@ fn not_started(requested: Option<usize>, error: &rayon::ThreadPoolBuildError) ->
     }
 }
 
+/// The option of a number of threads.
+fn threads(requested: usize) -> String {
+    option(&format!("threads = {requested}"))
+}
+
 fn refused(requested: Option<usize>, reason: String) -> Error {
-    let what = requested.map_or("the worker threads".to_owned(), |requested| format!("--threads {requested}"));
+    let what = requested.map_or("the worker threads".to_owned(), threads);
     Error::io(what, "start", std::io::Error::new(std::io::ErrorKind::WouldBlock, reason))
 }

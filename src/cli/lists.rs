@@ -11,21 +11,21 @@ use lanesweep_model::scenario::Category;
 use lanesweep_model::scenario::Driven;
 use lanesweep_model::scenario::parameterization::Parameterization;
 use lanesweep_support::ranges::refuse_repeats;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Parses the categories of a flag, in the order of every table; all if the list is empty.
-pub(super) fn categories(list: &[String], flag: &str) -> Result<Vec<Category>> {
+pub(super) fn categories(list: &[String], option: &'static str) -> Result<Vec<Category>> {
     if list.is_empty() {
         return Ok(Category::ALL.to_vec());
     }
     let parse = |text: &String| {
         Category::parse(text.trim()).ok_or_else(|| {
             let problem = format!("there is no category `{text}`");
-            Error::usage(Place::item(flag), problem, "use cut-in, cut-out, lvd")
+            Error::usage(Place::option(option), problem, "use cut-in, cut-out, lvd")
         })
     };
     let mut found = list.iter().map(parse).collect::<Result<Vec<_>>>()?;
-    refuse_repeats(|| Place::item(flag), found.iter().zip(list.iter().map(|text| text.trim())))?;
+    refuse_repeats(|| Place::option(option), found.iter().zip(list.iter().map(|text| text.trim())))?;
     found.sort();
     Ok(found)
 }
@@ -44,7 +44,7 @@ impl CategoriesFlag {
     /// # Errors
     /// [`Error::Usage`] for an unknown category.
     pub(super) fn list(&self) -> Result<Vec<Category>> {
-        categories(&self.categories, "--categories")
+        categories(&self.categories, "categories")
     }
 }
 
@@ -81,7 +81,7 @@ impl ModelsFlag {
     /// # Errors
     /// [`Error::Usage`] for an unknown model.
     pub(super) fn list(&self) -> Result<Vec<ModelId>> {
-        let mut list = models(self.models.iter().map(String::as_str), "--models")?;
+        let mut list = models(self.models.iter().map(String::as_str), "models")?;
         list.sort();
         Ok(list)
     }
@@ -151,7 +151,7 @@ impl CriterionFlag {
 pub(super) fn criterion(name: &str) -> Result<Criterion> {
     Criterion::parse(name.trim()).ok_or_else(|| {
         let problem = format!("there is no criterion `{name}`");
-        Error::usage(Place::item("--criterion"), problem, "use collision, ttc or btn")
+        Error::usage(Place::option("criterion"), problem, "use collision, ttc or btn")
     })
 }
 
@@ -178,11 +178,11 @@ impl ExposureFlags {
     }
 }
 
-/// Parses model names, in the given order; `all` or an empty list means every model. `flag` is the place in errors.
+/// Parses model names, in the given order; `all` or an empty list means every model. `option` is the place in errors.
 ///
 /// # Errors
 /// [`Error::Usage`] for an unknown or repeated model.
-pub(super) fn models<'a>(list: impl IntoIterator<Item = &'a str>, flag: &str) -> Result<Vec<ModelId>> {
+pub(super) fn models<'a>(list: impl IntoIterator<Item = &'a str>, option: &'static str) -> Result<Vec<ModelId>> {
     let mut named: Vec<(ModelId, &str)> = Vec::new();
     for text in list.into_iter().map(str::trim) {
         match ModelId::parse(text) {
@@ -191,14 +191,14 @@ pub(super) fn models<'a>(list: impl IntoIterator<Item = &'a str>, flag: &str) ->
             None => {
                 let problem = format!("there is no driver model `{text}`");
                 return Err(Error::usage(
-                    Place::item(flag),
+                    Place::option(option),
                     problem,
                     format!("use one of {}, or all", ModelId::names()),
                 ));
             }
         }
     }
-    refuse_repeats(|| Place::item(flag), named.iter().copied())?;
+    refuse_repeats(|| Place::option(option), named.iter().copied())?;
     Ok(if named.is_empty() { ModelId::ALL.to_vec() } else { named.into_iter().map(|(model, _)| model).collect() })
 }
 
@@ -213,22 +213,22 @@ pub(super) fn headways(list: &[String]) -> Result<Vec<Headway>> {
         }
         let value = text.trim().parse::<f64>().ok().filter(|v| v.is_finite() && *v > 0.0 && *v < 1e4);
         if let Some(value) = value.filter(|value| !Quantity::Headway.is_plausible(*value)) {
-            tracing::warn!("--thw: {} is used as it is", Quantity::Headway.describe(value));
+            tracing::warn!("{}: {} is used as it is", option("thw"), Quantity::Headway.describe(value));
         }
         value.map(Headway::thw).ok_or_else(|| {
             let problem = format!("`{text}` is not a time headway");
             let help = "give seconds above 0 with commas, `r157`, `paper` or `observed`";
-            Error::usage(Place::item("--thw"), problem, help)
+            Error::usage(Place::option("thw"), problem, help)
         })
     };
     if list.iter().any(|text| Headway::parse(text.trim()) == Some(Headway::Observed)) {
         let problem =
             "`observed` starts each scenario from its recorded gap and cannot be combined with other headways";
-        return Err(Error::usage(Place::item("--thw"), problem, "give `observed`, or a list of headways without it"));
+        return Err(Error::usage(Place::option("thw"), problem, "give `observed`, or a list of headways without it"));
     }
     let found = list.iter().map(parse).collect::<Result<Vec<_>>>()?;
     let meanings = found.iter().map(|headway| headway.identity());
-    refuse_repeats(|| Place::item("--thw"), meanings.zip(list.iter().map(|text| text.trim())))?;
+    refuse_repeats(|| Place::option("thw"), meanings.zip(list.iter().map(|text| text.trim())))?;
     Ok(found)
 }
 
@@ -243,7 +243,7 @@ fn parameterizations(categories: &[Category], list: &[String]) -> Result<Vec<Par
     let of_all = wanted.iter().filter(|key| **key == "all");
     let every = of_all.flat_map(|all| of_categories().map(|p| (p.key, *all)));
     let named = wanted.iter().filter(|key| **key != "all").map(|key| (*key, *key));
-    refuse_repeats(|| Place::item("--parameterizations"), every.chain(named))?;
+    refuse_repeats(|| Place::option("parameterizations"), every.chain(named))?;
     if wanted.is_empty() || wanted.contains(&"all") {
         return Ok(of_categories().collect());
     }
@@ -254,7 +254,7 @@ fn parameterizations(categories: &[Category], list: &[String]) -> Result<Vec<Par
         };
         let names: Vec<&str> = categories.iter().map(|c| c.label()).collect();
         return Err(Error::usage(
-            Place::item("--parameterizations"),
+            Place::option("parameterizations"),
             format!("there is no parameterization `{unknown}` of {}", names.join(", ")),
             format!("use {}, or all", Category::ALL.iter().map(of).collect::<Vec<_>>().join("; ")),
         ));

@@ -134,7 +134,7 @@ impl Map {
                 None => {
                     let problem = format!("there is no preset `{name}`");
                     let help = format!("presets: {}", Presets::ALL.map(Presets::name).join(", "));
-                    Err(Error::usage(Place::item("--preset"), problem, help))
+                    Err(Error::usage(Place::option("preset"), problem, help))
                 }
             },
             None => {

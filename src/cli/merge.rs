@@ -40,7 +40,7 @@ pub(super) struct Merge {
 impl Merge {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         if let Some(failures) = &self.failures {
-            guard(failures, "--failures", &self.folder, None)?;
+            guard(failures, "failures", &self.folder, None)?;
         }
         let [plan, out] =
             [&self.folder.join(PLAN_FILE), &self.folder].map(|path| quoted_word(&path.display().to_string()));
@@ -49,7 +49,7 @@ impl Merge {
         match merged {
             Merged::Study(_) if self.failures.is_some() => {
                 let help = "leave it out; `study --rows` writes every lane";
-                Err(Error::usage(Place::item("--failures"), "this is a study, not a sampling run", help))
+                Err(Error::usage(Place::option("failures"), "this is a study, not a sampling run", help))
             }
             Merged::Study(merged) => {
                 let (study, result) = *merged;

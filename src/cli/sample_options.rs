@@ -12,7 +12,7 @@ use lanesweep_stats::density::{DensityModel, Mixture};
 use lanesweep_stats::estimate::{BinomialInterval, Goal, Search, StopRule};
 use lanesweep_support::input_file::canonical;
 use lanesweep_support::ranges::refuse_repeats;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 impl Sample {
     /// The rule that ends the run.
@@ -104,9 +104,9 @@ const MAX_DRAWS: u64 = 10_000_000;
 const MAX_SPLIT: u64 = (1 << 48) - 1;
 
 /// The error for a flag that only crude Monte Carlo has.
-pub(super) fn only_crude(flag: &str) -> Error {
+pub(super) fn only_crude(flag: &'static str) -> Error {
     let problem = "this belongs to crude Monte Carlo";
-    Error::usage(Place::item(flag), problem, "use --estimator mc, or leave it out")
+    Error::usage(Place::option(flag), problem, format!("use {}, or leave it out", option("estimator = mc")))
 }
 
 impl Sample {
@@ -115,31 +115,31 @@ impl Sample {
         let settings = &self.settings;
         let is_crude = self.is_crude();
         if self.rows.is_some() && !is_crude {
-            return Err(only_crude("--rows"));
+            return Err(only_crude("rows"));
         }
         if settings.estimator == EstimatorKind::Is {
             if let Some(samples) = settings.samples.filter(|samples| *samples > MAX_SPLIT) {
                 let help = format!("give at least 1 and at most {MAX_SPLIT}");
-                return Err(Error::usage(Place::item("--samples"), format!("{samples} is out of range"), help));
+                return Err(Error::usage(Place::option("samples"), format!("{samples} is out of range"), help));
             }
             if settings.time_limit_s.is_some() {
-                return Err(only_crude("--time-limit"));
+                return Err(only_crude("time_limit"));
             }
         }
         let is_split = self.shards.is_part() || self.shards.plan_only;
         if is_split && is_crude && (settings.half_width.is_some() || settings.time_limit_s.is_some()) {
             let problem = "a part of a run cannot evaluate a stop rule of the whole run";
-            return Err(Error::usage(Place::item("--shard"), problem, "leave out the stop rules, or --shard"));
+            return Err(Error::usage(Place::option("shard"), problem, format!("leave out the stop rules, or {}", option("shard"))));
         }
         if !self.proposal.is_empty() && settings.estimator != EstimatorKind::Is {
             return Err(Error::usage(
-                Place::item("--proposal"),
+                Place::option("proposal"),
                 "a given proposal is sampled by importance sampling",
-                "add --estimator is",
+                format!("add {}", option("estimator = is")),
             ));
         }
         refuse_repeats(
-            || Place::item("--proposal"),
+            || Place::option("proposal"),
             self.proposal.iter().map(|path| (canonical(path), path.display())),
         )?;
         Ok(())
@@ -147,7 +147,7 @@ impl Sample {
 }
 
 /// Checks that a table of lanes replaces no other result.
-pub(super) fn guard(table: &Path, flag: &str, out: &Path, other: Option<&PathBuf>) -> Result<()> {
+pub(super) fn guard(table: &Path, flag: &'static str, out: &Path, other: Option<&PathBuf>) -> Result<()> {
     let results = ["estimate.json", "estimates.csv", "convergence.csv", "density.json"];
     let others: Vec<PathBuf> = results.iter().map(|name| out.join(name)).chain(other.cloned()).collect();
     super::source::refuse_overwriting(table, &others, flag)?;

@@ -12,7 +12,7 @@ use lanesweep_engine::{Chunk, CpuBackend, Executor, LanePlan, OpenBackend};
 use lanesweep_report::lanes;
 use lanesweep_report::sampling::SampleReport;
 use lanesweep_run::parts::{EachChunk, Job, PLAN_FILE};
-use lanesweep_run::sampling::{self, EstimateRow, FailingLane, SampleJob, SampleKind, SampleOptions, SampleResult};
+use lanesweep_run::sampling::{self, FailingLane, SampleJob, SampleKind, SampleOptions, SampleResult};
 use lanesweep_stats::density::read_density;
 use lanesweep_stats::estimate::{Search, StopRule};
 use lanesweep_support::atomic_file::StagedFile;
@@ -29,7 +29,7 @@ impl Sample {
             configured.refuse_with_plan()?;
             let sample = sampling::Sample::read(path)?;
             if self.rows.is_some() && sample.lane_plan().is_none() {
-                return Err(only_crude("--rows"));
+                return Err(only_crude("rows"));
             }
             self.guard_tables()?;
             return self.run_sample(sample, &configured.open()?, configured);
@@ -70,7 +70,7 @@ impl Sample {
         self.check()?;
         let Some(density) = &self.density else {
             return Err(Error::usage(
-                Place::item("`density`"),
+                Place::option("density"),
                 "there is none",
                 "give a file that `lanesweep fit` wrote",
             ));
@@ -92,8 +92,8 @@ impl Sample {
         let guard = |table: &Option<PathBuf>, flag, other| {
             table.as_ref().map_or(Ok(()), |table| guard(table, flag, &self.out, other))
         };
-        guard(&self.rows, "--rows", None)?;
-        guard(&self.failures, "--failures", self.rows.as_ref())
+        guard(&self.rows, "rows", None)?;
+        guard(&self.failures, "failures", self.rows.as_ref())
     }
 
     /// Executes a plan, whole or a shard of it.
@@ -177,14 +177,12 @@ impl Sample {
             })?;
         }
         if let Some(asked) = self.settings.half_width {
-            let of_criterion = |row: &&EstimateRow| row.criterion == self.settings.criterion && row.headway != "all";
-            let rows: Vec<&EstimateRow> = result.rows.iter().filter(of_criterion).collect();
-            let wider = rows.iter().filter(|row| row.draws_half_width() > asked).count();
+            let (wider, all) = result.wider_than(asked, self.settings.criterion);
             if wider > 0 {
                 tracing::warn!(
                     "{wider} of {} did not reach the half-width of {asked}: its weights vary more than the search foresaw, \
                      draws of the density met failures that it had missed, or the maximum number of samples ended it",
-                    counted(rows.len(), "row")
+                    counted(all, "row")
                 );
             }
         }

@@ -55,7 +55,9 @@ pub(super) struct Man {
 impl Man {
     pub(super) fn run(&self) -> Result<Output> {
         make_folder(&self.dir)?;
-        let mut program = command();
+        // A page has the values of every flag; help shows those of some as the value's name.
+        let with_values = |verb: clap::Command| verb.mut_args(|arg| arg.hide_possible_values(false));
+        let mut program = with_values(command()).mut_subcommands(|verb| with_values(verb).mut_subcommands(with_values));
         // Adds global flags and versions to the verbs.
         program.build();
         let mut pages = Vec::new();

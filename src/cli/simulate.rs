@@ -16,7 +16,7 @@ use lanesweep_report::trace::TraceReport;
 use lanesweep_run::reopen::{Reopened, TracedLanes};
 use lanesweep_support::files::{check_output, file_name, write_atomically};
 use lanesweep_support::run_folder::is_listed;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Run one concrete scenario and print or draw its time series
 ///
@@ -102,7 +102,8 @@ impl Simulate {
         configured: &Configured,
         options: Option<&PlayOptions>,
     ) -> Result<(TracedLanes, Vec<Concrete>, bool)> {
-        let wrong = |flag: &str, problem: &str, help: &str| Err(Error::usage(Place::item(flag), problem, help));
+        let wrong = |flag, problem: String, help: String| Err(Error::usage(Place::option(flag), problem, help));
+        let [lane, scenarios, from] = ["lane", "scenarios", "from"].map(option);
         let [key, ..] = &self.lane[..] else {
             let profile = configured.profile()?;
             let traced = self.flags()?.traced(&profile, self.plausibility.policy())?;
@@ -111,22 +112,24 @@ impl Simulate {
         };
         // The road of --xosc may have lanes of another width.
         if self.case.says_more_than_lanes() || options.is_none() && self.case.says_a_case() {
-            let help = "leave out the case's flags, or --lane with its --scenarios or --from";
-            return wrong("--lane", "the lane is a complete case: the other flags would be ignored", help);
+            let help = format!("leave out the case's options, or {lane} with its {scenarios} or {from}");
+            return wrong("lane", "the lane is a complete case: the others would be ignored".to_owned(), help);
         }
         let (mut mined, incomplete) = match &self.scenarios {
             Some(_) if self.from.is_some() && options.is_none() => {
-                return wrong("--scenarios", "the run (--from) has the scenario", "leave one out, or add --xosc DIR");
+                let help = format!("leave one out, or add {}", option("xosc"));
+                return wrong("scenarios", format!("the run ({from}) has the scenario"), help);
             }
             Some(path) => scenarios_of(path, self.plausibility.policy())?,
             None => Default::default(),
         };
         let reopened = match (&self.from, &self.scenarios) {
             (Some(dir), scenarios) => {
-                configured.refuse_assigned("is decided by the run (--from)", "leave it out")?;
+                configured.refuse_assigned(&format!("is decided by the run ({from})"), "leave it out")?;
                 let reopened = Reopened::run(dir, key)?;
                 if scenarios.is_some() && reopened.as_study().is_none() {
-                    return wrong("--scenarios", "sampled lanes have the mean sizes of their density", "leave it out");
+                    let problem = "sampled lanes have the mean sizes of their density".to_owned();
+                    return wrong("scenarios", problem, "leave it out".to_owned());
                 }
                 reopened
             }
@@ -135,8 +138,8 @@ impl Simulate {
                 Reopened::scenarios(&mut mined, &self.lane, &configured.profile()?, data)?
             }
             (None, None) => {
-                let help = "add --from DIR for a lane of a study or a sampling run, or --scenarios FILE";
-                return wrong("--lane", "a key alone does not identify a lane", help);
+                let help = format!("add {from} for a lane of a study or a sampling run, or {scenarios}");
+                return wrong("lane", "a key alone does not identify a lane".to_owned(), help);
             }
         };
         let keys = reopened.named(&self.lane, self.case.named_models()?.as_deref(), &self.compare)?;
@@ -152,8 +155,11 @@ impl Simulate {
         };
         let given = self.case.over(file);
         if !given.says_a_case() {
-            let help = "give a case (--category, --ego-speed, …), --case-file, --table, or a --lane with --from or \
-                        --scenarios";
+            let [category, speed, file, table, lane, from, scenarios] =
+                ["category", "ego_speed", "case_file", "table", "lane", "from", "scenarios"].map(option);
+            let help = format!(
+                "give a case ({category}, {speed}, …), {file}, {table}, or a {lane} with {from} or {scenarios}"
+            );
             return Err(Error::usage(Place::item("lanesweep simulate"), "there is nothing to simulate", help));
         }
         Ok(given)
@@ -164,12 +170,12 @@ impl Simulate {
         let Some(plot) = &self.plot else { return Ok(()) };
         if let Some(until) = self.plot_end.filter(|until| !(*until > 0.0 && *until < 1e9)) {
             let problem = format!("{until} s is out of range for a time axis");
-            return Err(Error::usage(Place::item("--plot-end"), problem, "give seconds above 0 and below 10^9"));
+            return Err(Error::usage(Place::option("plot_end"), problem, "give seconds above 0 and below 10^9"));
         }
         if plot.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("svg")) {
             let problem = format!("{} is not the name of an SVG file", plot.display());
             let help = "give a name that ends in .svg; `rsvg-convert` makes PNG and PDF of it";
-            return Err(Error::usage(Place::item("--plot"), problem, help));
+            return Err(Error::usage(Place::option("plot"), problem, help));
         }
         let is_of_run = |dir: &Path| {
             plot.parent().map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p }) == Some(dir)
@@ -177,7 +183,7 @@ impl Simulate {
         };
         if self.from.as_deref().is_some_and(is_of_run) {
             let problem = format!("{} is a result of the run", plot.display());
-            return Err(Error::usage(Place::item("--plot"), problem, "choose another name"));
+            return Err(Error::usage(Place::option("plot"), problem, "choose another name"));
         }
         check_output(plot)
     }

@@ -11,7 +11,7 @@ use super::signals::CANCEL;
 use lanesweep_model::plausibility::Implausible;
 use lanesweep_model::scenario::{DataProvenance, Driven, Scenario, ScenarioFile, read_scenario_file};
 use lanesweep_support::input_file::canonical;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 use lanesweep_traffic::Source;
 use lanesweep_traffic::mining::{Collection, counts, counts_text};
 
@@ -138,7 +138,9 @@ impl SourceFlags {
         let provenance = self.source(configured).provenance(&collection, given)?;
         let Some(driven) = provenance.driven else {
             tracing::warn!(
-                "exposure is unknown, because the scenarios have no driven time and distance; give --hours and --km"
+                "exposure is unknown, because the scenarios have no driven time and distance; give {} and {}",
+                option("hours"),
+                option("km")
             );
             return Ok((collection, provenance));
         };
@@ -158,10 +160,10 @@ pub(super) fn scenarios_of(path: &Path, implausible: Implausible) -> Result<(Vec
 }
 
 /// Refuses an output that is another of the run's outputs.
-pub(super) fn refuse_overwriting(output: &Path, others: &[PathBuf], flag: &str) -> Result<()> {
+pub(super) fn refuse_overwriting(output: &Path, others: &[PathBuf], flag: &'static str) -> Result<()> {
     match others.iter().find(|other| canonical(other) == canonical(output)) {
         Some(other) => Err(Error::usage(
-            Place::item(flag),
+            Place::option(flag),
             format!("{} would be overwritten: this run writes it", other.display()),
             "choose another path",
         )),

@@ -224,7 +224,7 @@ impl Study {
         let results = ["failures.csv", "f1.csv", "claims.csv", "reference.csv", "run.json"];
         let results = results.into_iter().chain([PLAN_FILE, RUN_PLAN_FILE]);
         let others: Vec<PathBuf> = results.map(|name| self.out.join(name)).collect();
-        source::refuse_overwriting(lanes, &others, "--rows")?;
+        source::refuse_overwriting(lanes, &others, "rows")?;
         table_format(lanes)?;
         check_output(lanes)
     }

@@ -17,7 +17,7 @@ use lanesweep_report::tracks::{TrackReport, across};
 use lanesweep_support::files::check_output;
 use lanesweep_support::run_folder::RunFolder;
 use lanesweep_support::table::{Table, TableMetadata};
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 use lanesweep_traffic::Source;
 use lanesweep_traffic::mining::{counts, mine, noise_notes};
 use lanesweep_traffic::trajectory::generator::generate_one;
@@ -64,8 +64,8 @@ impl Tracks {
         if let (Some(figures), Some(to)) = (&figures, &self.convert)
             && to.canonicalize().is_ok_and(|to| figures.dir().canonicalize().is_ok_and(|out| out == to))
         {
-            let problem = format!("{} is the folder of --out too", to.display());
-            return Err(Error::usage(Place::item("--convert"), problem, "give each a folder of its own"));
+            let problem = format!("{} is the folder of {} too", to.display(), option("out"));
+            return Err(Error::usage(Place::option("convert"), problem, "give each a folder of its own"));
         }
         let (table, highd) = match &self.convert {
             Some(to) if to.extension().is_none() => (None, Some(open(to, CONVERTED)?)),
@@ -119,7 +119,10 @@ impl Tracks {
     /// Writes the synthetic recordings, which no path names.
     fn generate(&self, configured: &Configured) -> Result<Output> {
         let Some(to) = self.convert.as_ref().filter(|to| to.extension().is_none()) else {
-            let help = "give track files, or only --convert DIR (a name without an ending), which writes the synthetic recordings";
+            let help = format!(
+                "give track files, or only {} (a name without an ending), which writes the synthetic recordings",
+                option("convert = DIR")
+            );
             return Err(Error::usage(Place::item("lanesweep tracks"), "there is nothing to read", help));
         };
         let options = &configured.settings.generator;

@@ -54,7 +54,7 @@ impl Verify {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         if self.random_lanes == 0 || self.random_lanes > MAX_LANES {
             let problem = format!("{} is not usable; expected 1 to {MAX_LANES}", self.random_lanes);
-            return Err(Error::usage(Place::item("--random-lanes"), problem, "choose a number in this range"));
+            return Err(Error::usage(Place::option("random_lanes"), problem, "choose a number in this range"));
         }
         let profile = configured.profile()?;
         let opened = configured.open_to_verify()?;

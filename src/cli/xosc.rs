@@ -11,7 +11,7 @@ use lanesweep_report::openscenario::{Concrete, EgoMotion, INDEX, PlayOptions, co
 use lanesweep_run::reopen::Reopened;
 use lanesweep_support::readable::counted;
 use lanesweep_support::run_folder::RunFolder;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// OpenSCENARIO files of the lanes.
 #[derive(Debug, Args)]
@@ -52,22 +52,22 @@ impl XoscFlags {
     /// The options of the files, if they are asked for; checks their folder.
     pub(super) fn options(&self, lane_width_m: Option<f64>) -> Result<Option<PlayOptions>> {
         let Some(dir) = &self.xosc else { return Ok(None) };
-        let refused = |flag, problem: String, help| Err(Error::usage(Place::item(flag), problem, help));
+        let refused = |flag, problem: String, help: &str| Err(Error::usage(Place::option(flag), problem, help));
         let ego = match self.ego {
             EgoFlag::Model => EgoMotion::Model,
             EgoFlag::External => EgoMotion::External,
         };
         if self.duration.is_some() && ego == EgoMotion::Model {
             let problem = "the ego follows the driver model, and its path ends with the lane".to_owned();
-            return refused("--duration", problem, "add --ego external, or leave out --duration");
+            return refused("duration", problem, &format!("add {}, or leave it out", option("ego = external")));
         }
         if let Some(duration) = self.duration.filter(|d| !(*d > 0.0 && *d <= 3600.0)) {
             let problem = format!("{duration} s is out of range");
-            return refused("--duration", problem, "give seconds above 0 and at most 3600");
+            return refused("duration", problem, "give seconds above 0 and at most 3600");
         }
         if let Some(width) = lane_width_m.filter(|w| !(1.0..=20.0).contains(w)) {
             let problem = format!("{width} m is not a lane width");
-            return refused("--lane-width", problem, "give 1 to 20 m, such as 3.5");
+            return refused("lane_width", problem, "give 1 to 20 m, such as 3.5");
         }
         drop(RunFolder::open(dir, INDEX)?);
         let side = self.side.map(|side| match side {
@@ -97,7 +97,8 @@ pub(super) fn played(
     if !are_lengths_known {
         tracing::warn!(
             "a study's plan has only the sum of two lengths: the ego gets the profile's length, the others the \
-             remainder; gaps and contacts do not change (--scenarios FILE has the lengths)"
+             remainder; gaps and contacts do not change ({} has the lengths)",
+            option("scenarios = FILE")
         );
     }
     Ok(scenarios)

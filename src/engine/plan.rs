@@ -244,7 +244,7 @@ impl LanePlan {
             return Err(Error::usage(Place::default(), format!("the sweep has no {what}"), "give at least one"));
         }
         refuse_repeats(|| Place::option("models"), models.iter().map(|model| (*model, model.name())))?;
-        refuse_repeats(|| Place::option("headways"), headways.iter().map(|headway| (headway.identity(), headway)))?;
+        refuse_repeats(|| Place::option("thw"), headways.iter().map(|headway| (headway.identity(), headway)))?;
         Headway::refuse_mixture(&headways)?;
         for block in &blocks {
             refuse_repeats(|| Place::item("variants"), block.variants.iter().map(|variant| (variant, variant)))?;

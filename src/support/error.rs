@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use std::fmt;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU8, Ordering};
 
 use crate::plain_text::{MAX_PATH, cut, cut_names, shown_in_line};
 
@@ -16,27 +16,30 @@ pub type Result<T> = std::result::Result<T, Error>;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Notation {
     /// On a command line: `--dt`, `--backend cpu`.
-    Flag,
+    Flag = 1,
     /// As arguments in Python: `dt`, `backend = cpu`.
     Argument,
 }
 
-static NOTATION: OnceLock<Notation> = OnceLock::new();
+static NOTATION: AtomicU8 = AtomicU8::new(0);
 
-/// Sets the notation of this process; the first one remains.
+/// Sets the notation of this process.
 pub fn write_options_as(notation: Notation) {
-    NOTATION.get_or_init(|| notation);
+    NOTATION.store(notation as u8, Ordering::Relaxed);
 }
 
 /// An option, by the name of its field, in the notation of this process; with a value: `backend = cpu`.
-pub fn option(name: &str) -> String {
-    match NOTATION.get() {
-        None => format!("option `{name}`"),
-        Some(Notation::Flag) => format!("--{}", name.replacen(" = ", " ", 1).replace('_', "-")),
-        // A keyword of Python.
-        Some(Notation::Argument) if name == "from" => "`from_`".to_owned(),
-        Some(Notation::Argument) => format!("`{name}`"),
+pub fn option(text: &str) -> String {
+    let notation = NOTATION.load(Ordering::Relaxed);
+    let (name, value) = text.split_once(" = ").map_or((text, None), |(name, value)| (name, Some(value)));
+    if notation == Notation::Flag as u8 {
+        let value = value.map(|value| format!(" {value}")).unwrap_or_default();
+        return format!("--{}{value}", name.replace('_', "-"));
     }
+    let prefix = if notation == Notation::Argument as u8 { "" } else { "option " };
+    // A keyword of Python.
+    let text = if text == "from" { "from_" } else { text };
+    format!("{prefix}`{text}`")
 }
 
 /// Adds an error to a list shown to users, unless the list already has it.

@@ -9,7 +9,7 @@ use serde_json::{Map, Value};
 
 use super::keys::{Key, KeyKind, from_word, keys_in_order};
 use super::{Settings, file};
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Source of a value; a later one overrides an earlier one.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -35,7 +35,7 @@ impl Origin {
         match self {
             Origin::File { path, row } => Place::file(path).row(*row).of(format!("`{key}`")),
             Origin::Default => Place::item(format!("`{key}`")),
-            Origin::Assignment(text) => Place::item(format!("--config {text}")),
+            Origin::Assignment(text) => Place::item(option(&format!("config = {text}"))),
             Origin::Flag(flag) => Place::item(flag),
         }
     }
@@ -150,7 +150,7 @@ impl Layers {
         let (name, word) = text.split_once('=').unwrap_or((text, ""));
         let name = name.trim();
         let Some(key) = Key::find(&self.keys, name).cloned() else {
-            let place = Place::item(format!("--config {text}"));
+            let place = Place::item(option(&format!("config = {text}")));
             return Err(file::unknown(place, name, false, &self.keys));
         };
         let origin = Origin::Assignment(text.to_owned());

@@ -45,6 +45,14 @@ pub struct Check {
     pub models: Vec<ModelId>,
 }
 
+/// Leaves out profiles that only add a cut-in clause of their own to the first one, in cases of another category.
+pub fn retain_applicable(profiles: &mut Vec<Profile>, category: Category) {
+    let Some(first) = profiles.first().filter(|_| category != Category::CutIn).cloned() else { return };
+    let is_first =
+        |p: &Profile| (&p.frame, &p.cchdm, &p.rss, &p.fsm) == (&first.frame, &first.cchdm, &first.rss, &first.fsm);
+    profiles.retain(|profile| profile.name == first.name || !is_first(profile));
+}
+
 /// One driver model in the case.
 #[derive(Debug, Clone)]
 pub struct Judged {

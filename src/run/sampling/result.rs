@@ -2,6 +2,7 @@
 
 use super::crude::CrudeRun;
 use super::estimate_rows::EstimateRow;
+use lanesweep_model::criterion::Criterion;
 use lanesweep_stats::density::Mixture;
 use lanesweep_stats::estimate::SearchRound;
 
@@ -20,4 +21,12 @@ pub struct SampleResult {
     pub parts: usize,
     /// Lanes that were rechecked.
     pub rechecked_lanes: u64,
+}
+
+impl SampleResult {
+    /// Number of rows of a criterion whose interval of the draws is wider than asked, and of all its rows.
+    pub fn wider_than(&self, half_width: f64, criterion: Criterion) -> (usize, usize) {
+        let rows = || self.rows.iter().filter(|row| row.criterion == criterion && row.headway != "all");
+        (rows().filter(|row| row.draws_half_width() > half_width).count(), rows().count())
+    }
 }

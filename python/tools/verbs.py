@@ -1,0 +1,114 @@
+"""Write `lanesweep/_verbs.py`, the verbs as functions, from what the program says of its flags.
+
+``python tools/verbs.py`` writes the file for the module that is installed; a test compares it.
+"""
+
+from __future__ import annotations
+
+import keyword
+import re
+import textwrap
+from pathlib import Path
+from typing import Any
+
+from lanesweep import _core
+
+FUNCTIONS = ["study", "tracks", "mine", "fit", "sample", "map", "check", "trace", "merge"]
+#: Types of arguments, by their names.
+NAMES = {
+    "categories": "Categories", "category": "Category", "compare": "Keys | bool", "config": "Config", "criterion": "Criterion",
+    "device": "str | Int", "external": "Paths | Mapping[str, Any]", "lane": "Values", "models": "Models",
+    "panel": "Values", "parameterizations": "Keys", "paths": "Paths", "profiles": "Paths", "proposal": "Paths",
+    "scenarios": "Path | Table", "set": "Values", "thw": "Headways",
+}  # fmt: skip
+#: Types of arguments, by the names of their values on the command line.
+VALUES = {
+    "N": "Int", "FRACTION": "Float", "s": "Number", "m": "Number", "m/s": "Number", "m/s²": "Number", "h": "Float", "km": "Float",
+    "km/h|m/s": "Speed", "I/N": "str", "ID": "str", "NAME": "str", "NAME=RANGE": "str", "TEXT": "str",
+}  # fmt: skip
+WIDTH = 120
+HEAD = '''"""Verbs of the program as functions: the same work, with values as arguments and a `Result` in place of text.
+
+Written by ``python tools/verbs.py`` from the help of the program.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+from ._result import Result
+from ._run import run
+from .options import {types}
+
+__all__ = [{names}]
+'''
+
+
+def type_of(argument: dict[str, Any], function: str) -> str:
+    """The annotation of an argument."""
+    name, value = argument["name"], argument["value"]
+    if value is None:
+        return "bool"
+    if name == "thw" and function in ("check", "trace"):
+        return "Number"
+    if name in NAMES:
+        return NAMES[name]
+    words = argument["words"] or (value.split("|") if value.islower() and "/" not in value and "|" in value else [])
+    if words:
+        return f"Literal[{', '.join(repr(word) for word in words)}]".replace("'", '"')
+    return VALUES.get(value, "Path")
+
+
+def python_name(name: str) -> str:
+    return f"{name}_" if keyword.iskeyword(name) else name
+
+
+def in_python(text: str) -> str:
+    """A help text with arguments in place of flags: `--half-width` is `half_width`."""
+    text = re.sub(r"(?<![\w-])`?--([a-z][a-z-]*)`?", lambda flag: f"`{python_name(flag[1].replace('-', '_'))}`", text)
+    return re.sub(r"\[default: (.*?)\]", r"By default \1.", text).strip()
+
+
+def sentence(text: str) -> str:
+    text = in_python(text)
+    return text if text.endswith((".", ":")) else f"{text}."
+
+
+def paragraphs(text: str, indent: str) -> str:
+    wrapped = (textwrap.fill(sentence(" ".join(part.split())), WIDTH, initial_indent=indent, subsequent_indent=indent) for part in text.split("\n\n") if part.strip())
+    return "\n\n".join(wrapped)
+
+
+def written(function: str) -> tuple[str, set[str]]:
+    """The source of a function, and the types that it uses."""
+    verb = _core.described(function)
+    types: set[str] = set()
+    positions, others, documented = [], [], []
+    for argument in sorted(verb["arguments"], key=lambda one: not one["is_position"]):
+        name, annotation = python_name(argument["name"]), type_of(argument, function)
+        types |= set(re.findall(r"\b[A-Z]\w+", re.sub(r'"[^"]*"', "", annotation)))
+        default = "" if argument["is_required"] else " = False" if annotation == "bool" else " = None"
+        optional = " | None" if default == " = None" else ""
+        (positions if argument["is_position"] else others).append(f"    {name}: {annotation}{optional}{default},")
+        help_text = " ".join(sentence(part) for part in argument["help"].split("\n\n"))
+        documented.append(f"    {name} : {annotation}\n" + paragraphs(help_text, " " * 8))
+    signature = "\n".join([*positions, "    *,", *others])
+    about, _, more = verb["about"].partition("\n\n")
+    doc = f'    """{sentence(about)}\n\n' + (paragraphs(more, "    ") + "\n\n" if more else "")
+    doc += "    Parameters\n    ----------\n" + "\n".join(documented) + '\n\n    Returns\n    -------\n    Result\n    """'
+    body = f'    return run("{function}", locals())'
+    return f"\n\ndef {function}(\n{signature}\n) -> Result:\n{doc}\n{body}\n", types
+
+
+def module() -> str:
+    """The source of `_verbs.py`."""
+    made = [written(function) for function in FUNCTIONS]
+    types = sorted(set().union(*(types for _, types in made)) - {"Any", "Literal", "Mapping", "None"})
+    names = "".join(f'\n    "{name}",' for name in sorted(FUNCTIONS))
+    head = HEAD.format(types="(" + "".join(f"\n    {one}," for one in types) + "\n)", names=names + "\n")
+    return head + "".join(text for text, _ in made)
+
+
+if __name__ == "__main__":
+    (Path(__file__).parents[1] / "lanesweep" / "_verbs.py").write_text(module(), encoding="utf-8")
