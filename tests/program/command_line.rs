@@ -65,7 +65,7 @@ fn help_names_every_verb_and_every_exit_code() {
     for exit in lanesweep::cli::Exit::ALL {
         assert!(help.contains(exit.meaning()), "{exit:?}");
     }
-    let chapter = include_str!("../../docs/src/reference/exit-codes.md");
+    let chapter = include_str!("../../docs/src/tables.md");
     for code in lanesweep::cli::Exit::ALL.map(|exit| exit.code()).into_iter().chain([129, 130, 143]) {
         assert!(help.lines().any(|line| line.trim_start().starts_with(&format!("{code}  "))), "{code}: {help}");
         assert!(chapter.contains(&format!("\n| {code} | ")), "the chapter on exit codes has no {code}");

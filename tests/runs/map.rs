@@ -469,7 +469,7 @@ fn tables_files_and_legends_of_a_map_count_the_same_cells() {
 }
 
 /// How many verdicts of the JRC's grids differ from `jrc-2021`, while the options of `un-r157` become those of `jrc-2021`
-/// one after another. The table of docs/src/methods/profiles.md: run it with `--nocapture`.
+/// one after another. docs/src/for-assessors.md names it: run it with `--nocapture`.
 #[test]
 fn named_options_explain_every_cell_between_the_readings() {
     let (mut reading, jrc) = (profile("un-r157"), profile("jrc-2021"));

@@ -6,7 +6,7 @@
 //! [`Measures`] are values without a verdict.
 //!
 //! To add a criterion: one file here, its twin in `shaders/`, one line in [`Criterion`], and the code that counts
-//! verdicts. The chapter `docs/src/extend/criterion.md` lists every place.
+//! verdicts. The chapter `docs/src/extend.md` lists every place.
 
 mod btn;
 mod collision;
