@@ -394,7 +394,7 @@ fn a_cell_without_a_conflict_is_a_case_without_one() {
                         let outcome = map.outcome(at, cell, Criterion::Collision);
                         let is_no_conflict = judged.verdicts.answer() == Answer::NoConflict;
                         let says_so = matches!(outcome, CellOutcome::NoConflict | CellOutcome::FailByReaction);
-                        assert_eq!(is_no_conflict, says_so, "{}, {:?}", grid.name(), grid.values(cell));
+                        assert_eq!(is_no_conflict, says_so, "{}, {:?}", grid.name, grid.values(cell));
                         if outcome == CellOutcome::NoConflict {
                             assert_eq!(outcome.label(), judged.verdicts.answer().label());
                         }
