@@ -1,20 +1,20 @@
-"""Verbs of the program as functions: the same work, with values as arguments and a `Result` in place of text."""
+"""Verbs of the program as functions: the same work, with values as arguments and a `Result` in place of text.
+
+Written by ``python tools/verbs.py`` from the help of the program.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from typing import TYPE_CHECKING, Any, Literal
-
-import numpy as np
+from collections.abc import Mapping
+from typing import Any, Literal
 
 from ._result import Result
 from ._run import run
 from .options import (
-    Case,
     Categories,
     Category,
+    Config,
     Criterion,
-    Data,
     Float,
     Headways,
     Int,
@@ -23,15 +23,10 @@ from .options import (
     Number,
     Path,
     Paths,
-    Plausibility,
-    Run,
-    Split,
-    Sweep,
+    Speed,
+    Table,
     Values,
 )
-
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
 
 __all__ = [
     "check",
@@ -46,257 +41,366 @@ __all__ = [
 ]
 
 
-class _Mining(Plausibility, Run, total=False):
-    preset: Path
-
-
-class _Fit(Data, Run, total=False): ...
-
-
-class _Study(Data, Split, total=False): ...
-
-
-class _Sample(Plausibility, Split, total=False): ...
-
-
-class _Map(Plausibility, Sweep, total=False): ...
-
-
-
 def study(
     recordings: Path | None = None,
     *,
-    categories: Categories | None = None,
-    models: Models | None = None,
-    thw: Headways | None = None,
+    scenarios: Path | Table | None = None,
     external: Paths | Mapping[str, Any] | None = None,
-    cross_validate: bool = False,
+    preset: Path | None = None,
+    filter: bool = False,
+    accept_implausible: bool = False,
+    synth_recordings: Int | None = None,
+    categories: Categories | None = None,
+    thw: Headways | None = None,
     published: bool = False,
-    rows: Path | None = None,
-    seed: Int | None = None,
+    models: Models | None = None,
+    cross_validate: bool = False,
+    profile: Path | None = None,
+    dt: Number | None = None,
     out: Path | None = None,
-    **options: Unpack[_Study],
+    rows: Path | None = None,
+    shard: str | None = None,
+    config: Config | None = None,
+    backend: Literal["auto", "cpu", "gpu"] | None = None,
+    device: str | Int | None = None,
+    seed: Int | None = None,
+    plan: Path | None = None,
+    plan_only: bool = False,
+    threads: Int | None = None,
 ) -> Result:
-    """Measure how far parameterized scenarios agree with recorded ones.
+    """How far do parameterized scenarios agree with recorded ones?
 
-    Mines cut-ins, cut-outs and leader decelerations. Replays each as recorded (S) and parameterized (S') from ten time headways
-    with every driver model, evaluates collision, TTC and BTN, and scores S' against S.
+    Mines cut-ins, cut-outs and leader decelerations. Replays each as recorded (S) and parameterized (S') from ten time
+    headways with every driver model, evaluates collision, TTC and BTN, and scores S' against S. Without data it uses
+    generated recordings. The answer goes to stdout, tables and figures to `out`.
 
     Parameters
     ----------
-    recordings : path, optional
-        Folder of recordings, or a track file, in highD's format or that of a preset; by default recordings are generated.
-    categories : list of {"cut-in", "cut-out", "lvd"}
-        Kinds of scenario, by default all.
-    models : list of str or Driver
-        Driver models, by default Reg157, CCHDM, RSS and FSM.
-    thw : list of float
-        Time headways, s. ``"paper"``, the default: 2.0, 1.8, … 0.2, which the paper's claims need. ``"r157"``: the minimum following
-        distance of UN R157, 5.2.3.3, at the ego's speed; a list may contain it. ``"observed"``: the recorded gaps.
-    external : list of paths, or mapping of names to tables
-        S' of another program: scenario files with the ids of S, whose series may have any sample rate and length.
-        Tables of pandas, Polars or pyarrow have a name each.
-    cross_validate : bool
-        Also replay scenarios by bases that have not seen them: each decomposition gets a variant, such as ``5-cv``. A basis fitted on
-        the scenarios that it replays flatters itself.
+    recordings : Path
+        Folder of recordings, or a track file, by default synthetic recordings. highD's format, or that of a preset,
+        which the names of the columns tell; see `lanesweep tracks`.
+    scenarios : Path | Table
+        Scenario file (.jsonl, .parquet, .csv) instead of recordings.
+    external : Paths | Mapping[str, Any]
+        S' of another program, a scenario file. It has the ids of S; its series may have any sample rate and length.
+    preset : Path
+        Format of the recordings: exid, sumo-fcd, … or a TOML file, by default detected.
+    filter : bool
+        Keep only scenarios of the file that pass the filters of mining, by default kept as given.
+    accept_implausible : bool
+        Use physically impossible values (a speed of 108 m/s) with a warning.
+    synth_recordings : Int
+        Number of generated recordings. They are called `01`, `02`, ….
+    categories : Categories
+        Kinds of scenario: cut-in, cut-out, lvd, by default all.
+    thw : Headways
+        Time headways, s; paper: 2.0, 1.8, … 0.2; r157; observed: the recorded gaps. The paper's claims need all of its
+        headways. r157: the minimum following distance of UN R157, 5.2.3.3, for the ego's speed; a list may contain it.
+        observed: each scenario starts from its recorded gap, and a density draws the headway as one more parameter; it
+        cannot be combined with other headways.
     published : bool
         Set the paper's published numbers (of highD) beside ours: on the page and in run.json.
-    rows : path
+    models : Models
+        Driver models: Reg157, CCHDM, RSS, FSM, by default all.
+    cross_validate : bool
+        Also replay scenarios by bases that have not seen them. Scenarios are divided into folds by recording ([study]
+        folds). Each decomposition gets a variant, 5-cv. A basis fitted on the scenarios that it replays flatters
+        itself.
+    profile : Path
+        paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc` takes
+        jrc-2021 unless it is set.
+    dt : Number, s
+        Time step, by default the profile's.
+    out : Path
+        Folder for tables, figures and run.json.
+    rows : Path
         Also write one row per lane: .csv, .jsonl or .parquet.
-    seed : int
-        Chooses the lanes that are checked on the CPU; no score depends on it.
-    out : path, optional
-        Folder of the files; without it they go with the result.
-    **options
-        `Data`, `Sweep` and `Split` of `lanesweep.options`.
+    shard : str
+        Compute shard I of N (from 0); `merge` merges them. The part is written to `out`. `auto/N` takes I from a
+        Kubernetes Indexed Job or a Slurm array.
+    config : Config
+        Configuration file, or one key of it. `lanesweep config init` writes such a file. Without `config`,
+        LANESWEEP_CONFIG names it.
+    backend : Literal["auto", "cpu", "gpu"]
+        Backend; auto: a GPU if there is one.
+    device : str | Int
+        Device, by part of its name, PCI bus id or index. `lanesweep devices` lists the devices. The default is the
+        first GPU.
+    seed : Int
+        Seed that chooses the lanes to check on the CPU. No score depends on it.
+    plan : Path
+        Run a plan that `plan_only` wrote.
+    plan_only : bool
+        Write the plan, plan.json in `out`, and stop.
+    threads : Int
+        Threads; results do not depend on it, by default all cores.
 
     Returns
     -------
     Result
     """
-    return run("study", locals(), default_out="study")
+    return run("study", locals())
 
 
 def tracks(
     paths: Paths | None = None,
     *,
     preset: Path | None = None,
-    convert: Path | None = None,
     synth_recordings: Int | None = None,
     out: Path | None = None,
-    **options: Unpack[Run],
+    convert: Path | None = None,
+    config: Config | None = None,
+    threads: Int | None = None,
 ) -> Result:
-    """Say what is in track files; check, draw and convert them.
+    """What is in a track file? Check it, draw it, convert it.
 
-    Finds the format by the names of the columns, reads the tracks and says what was understood: rate, vehicles, road, lanes, speeds,
-    scenarios. Checks the file against itself: units, axes, reference point, lanes, jumps, overlaps.
+    Finds the format by the names of the columns, reads the tracks and says what was understood: rate, vehicles, road,
+    lanes, speeds, scenarios. Checks the file against itself: units, axes, reference point, lanes, jumps, overlaps.
+    Verbs that take recordings read the same files. A preset is a TOML file that says what the columns mean. Without a
+    path, `convert` DIR writes the synthetic recordings that `study` uses without data.
 
     Parameters
     ----------
-    paths : list of paths
-        Track files, or folders of them. Without any, `convert` is a folder for the generated recordings that `study` uses without data.
-    preset : str or path
-        Format: ``"exid"``, ``"sumo-fcd"``, … or a TOML file that says what the columns mean; by default it is detected.
-    convert : path
-        Write the tracks in highD's format into this folder, or as one table: .csv, .parquet, .jsonl.
-    synth_recordings : int
-        Number of generated recordings, by default 84.
-    out : path, optional
-        Folder for tracks.json and a figure of each recording. Without it those of a single path go with the result.
-    **options
-        `Run` of `lanesweep.options`.
+    paths : Paths
+        Track files, or folders of them.
+    preset : Path
+        Format of the files: exid, sumo-fcd, … or a TOML file, by default detected.
+    synth_recordings : Int
+        Number of generated recordings. They are called `01`, `02`, ….
+    out : Path
+        Folder for tracks.json and a figure of each recording: positions across the road.
+    convert : Path
+        Write the tracks in highD's format into this folder, or as one table: .csv, .parquet.
+    config : Config
+        Configuration file, or one key of it. `lanesweep config init` writes such a file. Without `config`,
+        LANESWEEP_CONFIG names it.
+    threads : Int
+        Threads; results do not depend on it, by default all cores.
 
     Returns
     -------
     Result
     """
-    if paths is None:
-        return run("tracks", locals(), path=convert)
-    return run("tracks", locals(), default_out=None if _are_several(paths) else "tracks")
+    return run("tracks", locals())
 
 
-def _are_several(paths: Paths) -> bool:
-    """Whether figures could have the same names."""
-    return isinstance(paths, Collection) and not isinstance(paths, str) and len(paths) > 1
-
-
-def mine(recordings: Path, *, kept: bool = False, out: Path | None = None, **options: Unpack[_Mining]) -> Result:
+def mine(
+    recordings: Path,
+    *,
+    kept: bool = False,
+    preset: Path | None = None,
+    accept_implausible: bool = False,
+    out: Path | None = None,
+    config: Config | None = None,
+    threads: Int | None = None,
+) -> Result:
     """Mine cut-ins, cut-outs and leader decelerations from recordings.
+
+    Reads recordings in highD's format or another one (see `lanesweep tracks`) and writes one JSON line per scenario
+    with its series, or one row if FILE ends in .parquet; `study --scenarios FILE` reads it. The driven time and
+    distance go to FILE.exposure.json beside it, so that `fit --scenarios FILE` can compute events per hour.
 
     Parameters
     ----------
-    recordings : path
+    recordings : Path
         Folder of recordings, or a track file.
     kept : bool
         Only scenarios that pass the paper's filters.
-    out : path, optional
-        Scenario file, .jsonl or .parquet: a line or row per scenario with its series. The driven time and distance go beside it, from
-        which `fit` computes events per hour. Without it the file goes with the result.
-    **options
-        `preset` and `accept_implausible` of `Data`, and `Run`, of `lanesweep.options`.
+    preset : Path
+        Format of the recordings: exid, sumo-fcd, … or a TOML file, by default detected.
+    accept_implausible : bool
+        Use physically impossible values (a speed of 108 m/s) with a warning.
+    out : Path
+        File to write, .jsonl or .parquet, by default standard output, JSON Lines.
+    config : Config
+        Configuration file, or one key of it. `lanesweep config init` writes such a file. Without `config`,
+        LANESWEEP_CONFIG names it.
+    threads : Int
+        Threads; results do not depend on it, by default all cores.
 
     Returns
     -------
     Result
     """
-    return run("mine", locals(), default_out="scenarios.jsonl")
+    return run("mine", locals())
 
 
 def fit(
     recordings: Path | None = None,
     *,
+    scenarios: Path | Table | None = None,
+    hours: Float | None = None,
+    km: Float | None = None,
+    preset: Path | None = None,
+    filter: bool = False,
+    accept_implausible: bool = False,
+    synth_recordings: Int | None = None,
     categories: Categories | None = None,
     parameterizations: Keys | None = None,
     with_thw: bool = False,
-    hours: Float | None = None,
-    km: Float | None = None,
     without_scenarios: bool = False,
-    seed: Int | None = None,
     out: Path | None = None,
-    **options: Unpack[_Fit],
+    config: Config | None = None,
+    seed: Int | None = None,
+    threads: Int | None = None,
 ) -> Result:
-    """Fit densities to the parameters of scenarios, a file per category and parameterization.
+    """How are the parameters of scenarios distributed?
 
-    Also computes the physically possible share of each density, and how often such scenarios occur.
+    Fits a density to the kept scenarios of each category under each parameterization. Computes the physically possible
+    fraction of each density, and how often such scenarios occur. Writes one density file per parameterization. Without
+    data it uses generated recordings. Tables go to stdout, files to `out`.
 
     Parameters
     ----------
-    recordings : path, optional
-        Folder of recordings, or a track file; by default recordings are generated.
-    categories : list of {"cut-in", "cut-out", "lvd"}
-        Kinds of scenario, by default all.
-    parameterizations : list of str
-        1 to 7 of cut-ins, a to g of cut-outs, i to v of leader decelerations; by default all.
+    recordings : Path
+        Folder of recordings, or a track file, by default synthetic recordings. highD's format, or that of a preset,
+        which the names of the columns tell; see `lanesweep tracks`.
+    scenarios : Path | Table
+        Scenario file (.jsonl, .parquet, .csv) instead of recordings.
+    hours : Float, h
+        Driven time of all egos, by default from the recordings.
+    km : Float, km
+        Driven distance of all egos, by default from the recordings.
+    preset : Path
+        Format of the recordings: exid, sumo-fcd, … or a TOML file, by default detected.
+    filter : bool
+        Keep only scenarios of the file that pass the filters of mining, by default kept as given.
+    accept_implausible : bool
+        Use physically impossible values (a speed of 108 m/s) with a warning.
+    synth_recordings : Int
+        Number of generated recordings. They are called `01`, `02`, ….
+    categories : Categories
+        Kinds of scenario: cut-in, cut-out, lvd, by default all.
+    parameterizations : Keys
+        Parameterizations: 1…7, a…g, i…v, by default all. 1…7 are for cut-ins, a…g for cut-outs, i…v for leader
+        decelerations.
     with_thw : bool
         Add the observed time headway as a parameter (thw_s).
-    hours, km : float
-        Driven time, h, and distance, km, of all egos; by default those of the recordings.
     without_scenarios : bool
-        Leave the recorded series out of the files, which can then be shared; `sample` cannot compare its rates with theirs.
-    seed : int
+        Leave the recorded series out of the density files. `sample` then cannot compare its rates with those of the
+        recorded scenarios. Use it if you share the file but not the recordings.
+    out : Path
+        Folder of density files, or one file.json for one density.
+    config : Config
+        Configuration file, or one key of it. `lanesweep config init` writes such a file. Without `config`,
+        LANESWEEP_CONFIG names it.
+    seed : Int
         Seed of P_valid.
-    out : path, optional
-        Folder of the density files, or one file .json; without it they go with the result.
-    **options
-        `Data` and `Run` of `lanesweep.options`.
+    threads : Int
+        Threads; results do not depend on it, by default all cores.
 
     Returns
     -------
     Result
-        `Result.densities` has the files.
     """
-    return run("fit", locals(), default_out="densities")
+    return run("fit", locals())
 
 
 def sample(
     density: Path | None = None,
     *,
-    models: Models | None = None,
-    thw: Headways | None = None,
-    criterion: Criterion | None = None,
-    samples: Int | None = None,
-    half_width: Float | None = None,
-    estimator: Literal["auto", "mc", "is"] | None = None,
-    level: Float | None = None,
     proposal: Paths | None = None,
-    time_limit: Float | None = None,
+    accept_implausible: bool = False,
+    thw: Headways | None = None,
+    models: Models | None = None,
+    profile: Path | None = None,
+    estimator: Literal["auto", "mc", "is"] | None = None,
+    samples: Int | None = None,
+    criterion: Criterion | None = None,
+    half_width: Float | None = None,
+    dt: Number | None = None,
+    level: Float | None = None,
+    time_limit: Number | None = None,
     rows: Path | None = None,
     failures: Path | None = None,
-    seed: Int | None = None,
     out: Path | None = None,
-    **options: Unpack[_Sample],
+    shard: str | None = None,
+    config: Config | None = None,
+    backend: Literal["auto", "cpu", "gpu"] | None = None,
+    device: str | Int | None = None,
+    seed: Int | None = None,
+    plan: Path | None = None,
+    plan_only: bool = False,
+    threads: Int | None = None,
 ) -> Result:
-    """Estimate how likely a driver fails.
+    """How likely does a driver fail?
 
-    Draws concrete scenarios from a density, runs each against the driver models, and estimates the probability of failure with its
-    interval, by crude Monte Carlo or importance sampling. Each estimate has a verdict on whether to trust it.
+    Draws concrete scenarios from a density (see `lanesweep fit`), runs each against the driver models and estimates the
+    probability of failure with its interval, by crude Monte Carlo or importance sampling. With `half_width` it takes
+    the cheaper one for each question. Each estimate has a verdict on whether to trust it. A table goes to stdout, files
+    to `out`.
 
     Parameters
     ----------
-    density : path
-        Density file of `fit`, or a fit with one density.
-    models : list of str or Driver
-        Driver models, by default Reg157, CCHDM, RSS and FSM.
-    thw : list of float
-        Time headways, s; by default that of the density, else ``"paper"``: 2.0, 1.8, … 0.2. ``"observed"``: drawn as a parameter of the
-        density, which needs ``fit(with_thw=True)``.
-    criterion : {"collision", "ttc", "btn"}
-        Criterion to estimate to `half_width`; by default collision.
-    samples : int
-        Number of samples, by default 100,000 or as many as needed; with a half-width the maximum.
-    half_width : float
-        Half-width of the interval over the estimate to reach; 0.1 by default with ``estimator="is"`` and no `samples`.
-    estimator : {"auto", "mc", "is"}
-        Crude Monte Carlo, importance sampling, or the cheaper one for each question. ``"auto"`` without a half-width is ``"mc"``.
-    level : float
-        Level of the intervals, by default 0.95.
-    proposal : list of paths
-        Proposals to sample, with ``estimator="is"``; several are mixed with equal weights.
-    time_limit : float
-        Stop at the first check after this time, s; not reproducible.
-    rows : path
+    density : Path
+        Density file.
+    proposal : Paths
+        Proposal file to sample, with `estimator` is. Several are mixed with equal weights.
+    accept_implausible : bool
+        Use physically impossible values (a speed of 108 m/s) with a warning.
+    thw : Headways
+        Time headways, s, by default the density's, else paper. paper is 2.0, 1.8, … 0.2. observed (or sampled): the
+        headway is drawn from the recorded ones, as a parameter of the density, which needs `fit --with-thw`.
+    models : Models
+        Driver models: Reg157, CCHDM, RSS, FSM, by default all.
+    profile : Path
+        paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc` takes
+        jrc-2021 unless it is set.
+    estimator : Literal["auto", "mc", "is"]
+        Crude, importance, or the cheaper one. Importance sampling searches the failures, then draws around them; `auto`
+        chooses for each model and headway, and is `mc` without a half-width.
+    samples : Int
+        Number of samples, by default 100000, or as needed. With a half-width: the maximum.
+    criterion : Criterion
+        Criterion of importance sampling and of a half-width.
+    half_width : Float
+        Reach this half-width over estimate. It is that of the draws' interval; mc checks it after 4096·2^k samples. The
+        default of is is 0.1 unless the number of samples is given; else none.
+    dt : Number, s
+        Time step, by default the profile's.
+    level : Float
+        Level of the intervals.
+    time_limit : Number, s
+        Stop at the first check after this time (not reproducible), by default no limit.
+    rows : Path
         Also write one row per lane: .csv, .jsonl or .parquet.
-    failures : path
-        Also write the first failing lanes of each model and criterion, at most 1000 of each (key ``sample.failures_limit``), with the
-        columns of `rows`.
-    seed : int
+    failures : Path
+        Also write the first failing lanes of each model and criterion: .csv, .jsonl or .parquet. The first 1000, or
+        sample.failures_limit; with the columns of `rows`. For a run in parts: `merge --failures`.
+    out : Path
+        Folder for estimate.json, tables and figures.
+    shard : str
+        Compute shard I of N (from 0); `merge` merges them. The part is written to `out`. `auto/N` takes I from a
+        Kubernetes Indexed Job or a Slurm array.
+    config : Config
+        Configuration file, or one key of it. `lanesweep config init` writes such a file. Without `config`,
+        LANESWEEP_CONFIG names it.
+    backend : Literal["auto", "cpu", "gpu"]
+        Backend; auto: a GPU if there is one.
+    device : str | Int
+        Device, by part of its name, PCI bus id or index. `lanesweep devices` lists the devices. The default is the
+        first GPU.
+    seed : Int
         Seed of the draws.
-    out : path, optional
-        Folder of the files; without it they go with the result.
-    **options
-        `Sweep`, `Split` and `accept_implausible` of `lanesweep.options`.
+    plan : Path
+        Run a plan that `plan_only` wrote.
+    plan_only : bool
+        Write the plan, plan.json in `out`, and stop.
+    threads : Int
+        Threads; results do not depend on it, by default all cores.
 
     Returns
     -------
     Result
     """
-    return run("sample", locals(), default_out="sample")
+    return run("sample", locals())
 
 
 def map(
     category: Category,
     *,
-    preset: Literal["jrc", "r157"] | None = None,
+    accept_implausible: bool = False,
+    preset: str | None = None,
     x: str | None = None,
     y: str | None = None,
     panel: Values | None = None,
@@ -304,39 +408,66 @@ def map(
     models: Models | None = None,
     criterion: Criterion | None = None,
     robust: bool = False,
+    profile: Path | None = None,
+    dt: Number | None = None,
     out: Path | None = None,
-    **options: Unpack[_Map],
+    config: Config | None = None,
+    backend: Literal["auto", "cpu", "gpu"] | None = None,
+    device: str | Int | None = None,
+    threads: Int | None = None,
 ) -> Result:
-    """Map outcomes over two parameters; every cell is a concrete case.
+    """Map outcomes over two parameters.
+
+    Every cell is one concrete case. `preset` takes the grids of the JRC's evidence (jrc) or of the regulation's Annex 3
+    (r157, to 60 and to 130 km/h); `x`, `y`, `panel` and `set` define any other grid. Writes a sheet per grid and model
+    (SVG), cells.csv and map.json. The percentages of cells with a failure go to stdout.
 
     Parameters
     ----------
-    category : {"cut-in", "cut-out", "lvd"}
-        Kind of scenario.
-    preset : {"jrc", "r157"}
-        Grids of the JRC's evidence, or of the regulation's Annex 3 (to 60 and to 130 km/h), with their models.
-    x, y : str
-        Parameter of an axis: ``"gap_m=5..40/1"``, ``"gap_m=5,10,20"``.
-    panel : mapping
-        Parameters of the panels: ``{"ego_speed_kmh": [60, 90]}``; several give one panel per combination.
-    set : mapping
-        Constant parameters: ``{"ego_speed_kmh": 108}``.
-    models : list of str or Driver
-        Driver models, by default all, or those of the preset.
-    criterion : {"collision", "ttc", "btn"}
-        Criterion, by default collision.
+    category : Category
+        Kind of scenario: cut-in, cut-out, lvd.
+    accept_implausible : bool
+        Use physically impossible values (a speed of 108 m/s) with a warning.
+    preset : str
+        Predefined grids with their models: jrc, r157.
+    x : str
+        Parameter of the x axis: NAME=FROM..TO/STEP or NAME=A,B,C.
+    y : str
+        Parameter of the y axis.
+    panel : Values
+        Parameter of the panels. Several of them give one panel per combination.
+    set : Values
+        Constant parameter.
+    models : Models
+        Driver models: Reg157, CCHDM, RSS, FSM, by default all.
+    criterion : Criterion
+        Criterion to evaluate.
     robust : bool
-        Mark cells whose outcome changes with a tenth of the time step, 1 cm or 0.1 km/h: they are undecided.
-    out : path, optional
-        Folder of the files; without it they go with the result.
-    **options
-        `Sweep` and `accept_implausible` of `lanesweep.options`.
+        Mark cells whose outcome changes with a tenth of the time step, 1 cm or 0.1 km/h. They are undecided. Each cell
+        is simulated eight times; sheets show undecided cells in their own colour.
+    profile : Path
+        paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc` takes
+        jrc-2021 unless it is set.
+    dt : Number, s
+        Time step, by default the profile's.
+    out : Path
+        Folder of the results.
+    config : Config
+        Configuration file, or one key of it. `lanesweep config init` writes such a file. Without `config`,
+        LANESWEEP_CONFIG names it.
+    backend : Literal["auto", "cpu", "gpu"]
+        Backend; auto: a GPU if there is one.
+    device : str | Int
+        Device, by part of its name, PCI bus id or index. `lanesweep devices` lists the devices. The default is the
+        first GPU.
+    threads : Int
+        Threads; results do not depend on it, by default all cores.
 
     Returns
     -------
     Result
     """
-    return run("map", locals(), default_out="map")
+    return run("map", locals())
 
 
 def check(
@@ -344,147 +475,281 @@ def check(
     *,
     row: Int | None = None,
     scenario: str | None = None,
+    accept_implausible: bool = False,
+    category: Category | None = None,
+    ego_speed: Speed | None = None,
+    speed: Speed | None = None,
+    gap: Number | None = None,
+    thw: Number | None = None,
+    lateral_speed: Number | None = None,
+    acceleration: Number | None = None,
+    ahead_gap: Number | None = None,
+    lateral_distance: Number | None = None,
+    end_speed: Speed | None = None,
+    ahead_speed: Speed | None = None,
+    length: Number | None = None,
+    width: Number | None = None,
+    ego_length: Number | None = None,
+    ego_width: Number | None = None,
+    lane_width: Number | None = None,
     models: Models | None = None,
     profiles: Paths | None = None,
     nominal: bool = False,
     sheet: Path | None = None,
     rows: Path | None = None,
-    backend: Literal["auto", "cpu", "gpu"] | None = None,
-    device: str | Int | None = None,
     date: str | None = None,
     author: str | None = None,
-    **case: Unpack[Case],
+    config: Config | None = None,
+    backend: Literal["auto", "cpu", "gpu"] | None = None,
+    device: str | Int | None = None,
+    threads: Int | None = None,
 ) -> Result:
-    """Check whether the reference drivers of UN R157 avoid the collision of a concrete case.
+    """Check concrete cases: do the reference drivers of UN R157 avoid the collision?
 
-    Every model runs under every profile. The case is preventable if CCHDM or FSM, the drivers of Annex 3, avoids the collision under the
-    first profile. It has no conflict if nothing collides even when the ego never reacts. It is undecided if a tenth of the time step or
-    a measurement error of an input changes the answer. It is outside Annex 3 if the annex does not describe such a case.
+    The case comes from flags, from a TOML file or a table (keys and columns are the flags' names with `_`, speeds with
+    their unit, `ego_speed_kmh`; flags override them), or from a scenario of a file. Every model runs under every
+    profile. The case is preventable if CCHDM or FSM, the drivers of Annex 3, avoids the collision under the first
+    profile. It has no conflict if nothing collides even when the ego never reacts. It is undecided if a tenth of the
+    time step or a measurement error of an input changes the answer. It is outside Annex 3 if the annex does not
+    describe such a case. The output also has the margins, the clauses, and the distance to another answer along each
+    parameter. A table without `row` is judged whole, under one profile, with a line per row; its exit status is that of
+    its worst answer, in the order not preventable, undecided, outside Annex 3, preventable, no conflict. Exit status: 0
+    preventable, 1 not preventable, 8 undecided, 9 no conflict, 10 outside Annex 3, 4 parts of the input were skipped.
 
     Parameters
     ----------
-    file : path, optional
-        TOML file, table (.csv, .parquet) or scenario file (.jsonl) with the case. A table without `row` is judged whole.
-    row : int
-        Row of a table, from 1 after the header.
+    file : Path
+        TOML file, table (.csv, .parquet) or scenario file (.jsonl) with the case.
+    row : Int
+        Row of a table, from 1 after the header, by default all rows.
     scenario : str
         Scenario of a scenario file, by its id. It starts with its observed gap, or with `gap` or `thw`.
-    models : list of str or Driver
-        Driver models, by default Reg157, CCHDM, RSS and FSM.
-    profiles : list of str or path
-        Profiles; the first one decides. By default un-r157, the two of EU 2022/1426, jrc-2021, paper and paper-fit.
+    accept_implausible : bool
+        Use physically impossible values (a speed of 108 m/s) with a warning.
+    category : Category
+        Kind of scenario: cut-in, cut-out, lvd.
+    ego_speed : Speed
+        Initial speed of the ego, with its unit: 60km/h.
+    speed : Speed
+        Initial speed of the other vehicle, with its unit, by default the ego's.
+    gap : Number, m
+        Initial gap, bumper to bumper.
+    thw : Number, s
+        Initial time headway instead of the gap.
+    lateral_speed : Number, m/s
+        Cut-in, cut-out: lateral speed.
+    acceleration : Number, m/s²
+        Acceleration of the other vehicle; an LVD needs one, by default 0.
+    ahead_gap : Number, m
+        Cut-out: gap between the two, bumper to bumper.
+    lateral_distance : Number, m
+        Cut-in: lateral distance at the start; cut-out: at the end, by default the lane's width.
+    end_speed : Speed
+        Speed at which the acceleration ends, with its unit, by default standstill, or never.
+    ahead_speed : Speed
+        Cut-out: speed of the vehicle ahead of the cutting-out one, with its unit, by default 0.
+    length : Number, m
+        Length of every vehicle, by default the profile's.
+    width : Number, m
+        Width of every vehicle, by default the profile's.
+    ego_length : Number, m
+        Length of the ego, by default that of every vehicle.
+    ego_width : Number, m
+        Width of the ego, by default that of every vehicle.
+    lane_width : Number, m
+        Width of the lanes, by default the scenario's, else 3.5.
+    models : Models
+        Driver models: Reg157, CCHDM, RSS, FSM, by default all.
+    profiles : Paths
+        Profiles; the first one decides, by default un-r157, and the five others.
     nominal : bool
-        Only the computed answers of a table, by lanes: a million rows take seconds. No perturbation, clause or boundary is examined.
-    sheet : path
-        Also write the case sheet as an HTML page.
-    rows : path
+        Only the computed answers of a table, by lanes: a million rows take seconds. No perturbation, clause or boundary
+        is examined, so that no answer is robust.
+    sheet : Path
+        Also write the sheet of a case, a page to print.
+    rows : Path
         Also write a table's answers, one row per case: .csv, .jsonl or .parquet.
-    backend : {"auto", "cpu", "gpu"}
-        Of `nominal`. ``"auto"``: a GPU if there is one.
-    device : str or int
-        Device of `nominal`, by part of its name, PCI bus id or index.
-    date, author : str
-        Date of the run and author, as the sheet is to show them. The clock is not asked.
-    **case
-        `Case` of `lanesweep.options`; it overrides values of a file.
+    date : str
+        Date of the run, as the sheet is to show it; the clock is not asked.
+    author : str
+        Author, as the sheet is to show it.
+    config : Config
+        Configuration file, or one key of it. `lanesweep config init` writes such a file. Without `config`,
+        LANESWEEP_CONFIG names it.
+    backend : Literal["auto", "cpu", "gpu"]
+        Backend; auto: a GPU if there is one.
+    device : str | Int
+        Device, by part of its name, PCI bus id or index. `lanesweep devices` lists the devices. The default is the
+        first GPU.
+    threads : Int
+        Threads; results do not depend on it, by default all cores.
 
     Returns
     -------
     Result
-        Its status is ``"ok"`` (preventable), ``"not preventable"``, ``"undecided"``, ``"no conflict"``, ``"outside Annex 3"`` or
-        ``"incomplete"``; of a whole table, that of its worst answer, in the order not preventable, undecided, outside Annex 3,
-        preventable, no conflict.
     """
     return run("check", locals())
 
 
 def trace(
     *,
-    from_: Path | None = None,
-    lane: str | Collection[str] | None = None,
-    scenarios: Path | None = None,
-    compare: Keys | bool = False,
     case_file: Path | None = None,
     table: Path | None = None,
     row: Int | None = None,
+    scenarios: Path | Table | None = None,
+    from_: Path | None = None,
+    lane: Values | None = None,
+    accept_implausible: bool = False,
+    category: Category | None = None,
+    ego_speed: Speed | None = None,
+    speed: Speed | None = None,
+    gap: Number | None = None,
+    thw: Number | None = None,
+    lateral_speed: Number | None = None,
+    acceleration: Number | None = None,
+    ahead_gap: Number | None = None,
+    compare: Keys | bool | None = None,
+    lateral_distance: Number | None = None,
+    end_speed: Speed | None = None,
+    ahead_speed: Speed | None = None,
+    length: Number | None = None,
+    width: Number | None = None,
+    ego_length: Number | None = None,
+    ego_width: Number | None = None,
+    lane_width: Number | None = None,
     models: Models | None = None,
     profile: Path | None = None,
-    dt: Float | None = None,
+    dt: Number | None = None,
     plot: Path | None = None,
-    plot_end: Number | None = None,
     xosc: Path | None = None,
+    plot_end: Number | None = None,
     ego: Literal["model", "external"] | None = None,
     duration: Number | None = None,
     side: Literal["left", "right"] | None = None,
-    **case: Unpack[Case],
+    config: Config | None = None,
+    threads: Int | None = None,
 ) -> Result:
-    """Run one case, or lanes of a finished run, step by step. For many cases there is `simulate`.
+    """Run one concrete scenario and print or draw its time series.
+
+    The case comes from flags, from a TOML file, from a row of a table (keys and columns are the flags' names with `_`,
+    speeds with their unit, `ego_speed_kmh`; flags override them), or from a finished run or a scenario file with a lane
+    key. The series goes to stdout as CSV, the outcome to stderr, the figure to `plot`, OpenSCENARIO files to `xosc`.
+    Several models (`models` FSM,RSS), variants (`compare`) or lanes follow one another in the CSV and share one figure.
 
     Parameters
     ----------
-    from_ : path
-        Folder of a study or sample: repeats `lane` with the run's profile and options, bit for bit.
-    lane : list of str
-        Keys of lanes: scenario/variant/headway/model.
-    scenarios : path
-        Scenario file, for `lane`; with a study and `xosc`: its scenarios, for sizes, side and lane width.
-    compare : bool or list of str
-        Also simulate other variants of the lane's scenario: True for S, keys of parameterizations, or ``"all"``.
-    case_file : path
+    case_file : Path
         TOML file with the case.
-    table : path
+    table : Path
         Table (.csv, .parquet) with one case per row.
-    row : int
+    row : Int
         Row of the table, from 1 after the header; needed if it has several.
-    models : list of str or Driver
-        Driver models, by default Reg157, CCHDM, RSS and FSM.
-    profile : str or path
-        Constants of drivers and criteria, by default ``"paper"``.
-    dt : float
-        Time step, s; by default that of the profile.
-    plot : path
-        Also draw the series, as SVG.
-    plot_end : float
-        End of the figure's time axis, s.
-    xosc : path
-        Also write every lane as ASAM OpenSCENARIO XML 1.2 with an OpenDRIVE road into this folder; index.csv lists them with their
-        outcomes. The other vehicles follow their own motion, step by step.
-    ego : {"model", "external"}
-        In `xosc` the ego follows the path that the driver model drove; or only its start is written, for a controller of your own.
-    duration : float
-        End of the scenario with ``ego="external"``, s; by default 10 s after the lane's last event and end.
-    side : {"left", "right"}
-        Side in `xosc` that the other vehicle comes from or leaves to; by default the scenario's, else left.
-    **case
-        `Case` of `lanesweep.options`; it overrides values of a file.
+    scenarios : Path | Table
+        Scenario file (.jsonl, .parquet, .csv) for `lane`. With `from_` a study and `xosc`: the study's scenarios, for
+        sizes, side and lane width.
+    from_ : Path
+        Folder (`out`) of a study or sample, for `lane`. Repeats that lane with the run's profile and options, bit for
+        bit, and reports whether f64 gives another outcome.
+    lane : Values
+        Lane key: scenario/variant/headway/model.
+    accept_implausible : bool
+        Use physically impossible values (a speed of 108 m/s) with a warning.
+    category : Category
+        Kind of scenario: cut-in, cut-out, lvd.
+    ego_speed : Speed
+        Initial speed of the ego, with its unit: 60km/h.
+    speed : Speed
+        Initial speed of the other vehicle, with its unit, by default the ego's.
+    gap : Number, m
+        Initial gap, bumper to bumper.
+    thw : Number, s
+        Initial time headway instead of the gap.
+    lateral_speed : Number, m/s
+        Cut-in, cut-out: lateral speed.
+    acceleration : Number, m/s²
+        Acceleration of the other vehicle; an LVD needs one, by default 0.
+    ahead_gap : Number, m
+        Cut-out: gap between the two, bumper to bumper.
+    compare : Keys | bool
+        Also simulate other variants of the lane's scenario. S (the recorded scenario; the default without a value),
+        keys of parameterizations, or all.
+    lateral_distance : Number, m
+        Cut-in: lateral distance at the start; cut-out: at the end, by default the lane's width.
+    end_speed : Speed
+        Speed at which the acceleration ends, with its unit, by default standstill, or never.
+    ahead_speed : Speed
+        Cut-out: speed of the vehicle ahead of the cutting-out one, with its unit, by default 0.
+    length : Number, m
+        Length of every vehicle, by default the profile's.
+    width : Number, m
+        Width of every vehicle, by default the profile's.
+    ego_length : Number, m
+        Length of the ego, by default that of every vehicle.
+    ego_width : Number, m
+        Width of the ego, by default that of every vehicle.
+    lane_width : Number, m
+        Width of the lanes, by default the scenario's, else 3.5.
+    models : Models
+        Driver models: Reg157, CCHDM, RSS, FSM, by default all.
+    profile : Path
+        paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc` takes
+        jrc-2021 unless it is set.
+    dt : Number, s
+        Time step, by default the profile's.
+    plot : Path
+        Also draw the time series. Speed, acceleration, gap, TTC, BTN, PFS, CFS and lateral position, with reaction,
+        braking and contact.
+    xosc : Path
+        Also write ASAM OpenSCENARIO XML 1.2 with OpenDRIVE roads. Every lane becomes NNN-KEY.xosc and NNN-KEY.xodr in
+        this folder; index.csv lists them with their outcomes. The other vehicles follow their own motion, step by step.
+    plot_end : Number, s
+        End of the figure's time axis, by default 2 s after the last change.
+    ego : Literal["model", "external"]
+        Driver of the ego in `xosc`.
+    duration : Number, s
+        End of the scenario with `ego` external, by default 10 s after the lane's last event and end.
+    side : Literal["left", "right"]
+        Side in `xosc` that the other vehicle comes from or leaves to, by default the scenario's, else left.
+    config : Config
+        Configuration file, or one key of it. `lanesweep config init` writes such a file. Without `config`,
+        LANESWEEP_CONFIG names it.
+    threads : Int
+        Threads; results do not depend on it, by default all cores.
 
     Returns
     -------
     Result
-        Its text is the series, as CSV.
     """
-    if isinstance(compare, (bool, np.bool_)):
-        return run("trace", {**locals(), "compare": "S" if compare else None})
     return run("trace", locals())
 
 
-def merge(folder: Path, *, failures: Path | None = None, **options: Unpack[Run]) -> Result:
-    """Merge the parts of a run into its result, bit for bit that of the whole run.
+def merge(
+    folder: Path,
+    *,
+    failures: Path | None = None,
+    config: Config | None = None,
+    threads: Int | None = None,
+) -> Result:
+    """Merge the parts of a run into its result.
 
-    Checks that the parts belong to the plan in the folder, are complete, and cover every lane exactly once. Names each missing, double,
-    foreign or damaged part.
+    Checks that the parts in DIR (written by `shard`) belong to the plan in DIR, are complete, and cover every lane
+    exactly once. Names each missing, duplicate, foreign or damaged part, with the command that recomputes it. The
+    result is written to DIR; it equals, bit for bit, the result of the unsplit run.
 
     Parameters
     ----------
-    folder : path
-        Folder of the run, with its plan and parts.
-    failures : path
-        Of a sampling run: also write the first failing lanes, as of `sample`.
-    **options
-        `Run` of `lanesweep.options`.
+    folder : Path
+        The run's folder.
+    failures : Path
+        Of a sampling run: also write the first failing lanes, as `sample --failures`.
+    config : Config
+        Configuration file, or one key of it. `lanesweep config init` writes such a file. Without `config`,
+        LANESWEEP_CONFIG names it.
+    threads : Int
+        Threads; results do not depend on it, by default all cores.
 
     Returns
     -------
     Result
     """
-    return run("merge", locals(), path=folder)
+    return run("merge", locals())

@@ -65,14 +65,21 @@ def python_name(name: str) -> str:
 
 
 def in_python(text: str) -> str:
-    """A help text with arguments in place of flags: `--half-width` is `half_width`."""
-    text = re.sub(r"(?<![\w-])`?--([a-z][a-z-]*)`?", lambda flag: f"`{python_name(flag[1].replace('-', '_'))}`", text)
-    return re.sub(r"\[default: (.*?)\]", r"By default \1.", text).strip()
+    """A help text with arguments in place of flags: `--half-width` is `half_width`. A command stays one."""
+    parts = text.split("`")
+    flag = re.compile(r"(?<![\w-])--([a-z][a-z-]*)")
+    for at, part in enumerate(parts):
+        is_command = at % 2 == 1 and " " in part
+        mark = "`" if at % 2 == 0 else ""
+        if not is_command:
+            parts[at] = flag.sub(lambda found: mark + python_name(found[1].replace("-", "_")) + mark, part)
+    text = re.sub(r"[;.] [Rr]epeatable$", "", "`".join(parts).strip().removesuffix("."))
+    return re.sub(r"\s*\[default: (.*?)\]", r", by default \1", text)
 
 
 def sentence(text: str) -> str:
     text = in_python(text)
-    return text if text.endswith((".", ":")) else f"{text}."
+    return text if text.endswith((".", ":", "?")) else f"{text}."
 
 
 def paragraphs(text: str, indent: str) -> str:
@@ -92,7 +99,8 @@ def written(function: str) -> tuple[str, set[str]]:
         optional = " | None" if default == " = None" else ""
         (positions if argument["is_position"] else others).append(f"    {name}: {annotation}{optional}{default},")
         help_text = " ".join(sentence(part) for part in argument["help"].split("\n\n"))
-        documented.append(f"    {name} : {annotation}\n" + paragraphs(help_text, " " * 8))
+        unit = f", {argument['value']}" if annotation in ("Float", "Number") and argument["value"] != "FRACTION" else ""
+        documented.append(f"    {name} : {annotation}{unit}\n" + paragraphs(help_text, " " * 8))
     signature = "\n".join([*positions, "    *,", *others])
     about, _, more = verb["about"].partition("\n\n")
     doc = f'    """{sentence(about)}\n\n' + (paragraphs(more, "    ") + "\n\n" if more else "")
