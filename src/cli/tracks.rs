@@ -12,14 +12,13 @@ use super::console::Total;
 use super::format::FormatFlag;
 use super::{Exit, Output, source};
 use lanesweep_model::plausibility::Implausible;
-use lanesweep_model::scenario::usable;
 use lanesweep_report::tracks::{TrackReport, across};
 use lanesweep_support::files::check_output;
 use lanesweep_support::run_folder::RunFolder;
 use lanesweep_support::table::{Table, TableMetadata};
 use lanesweep_support::{Error, Place, Result, option};
 use lanesweep_traffic::Source;
-use lanesweep_traffic::mining::{counts, mine, noise_notes};
+use lanesweep_traffic::mining::{counts, mine_loaded};
 use lanesweep_traffic::trajectory::generator::generate_one;
 use lanesweep_traffic::trajectory::highd::{self, SYNTHETIC_MARKER};
 use lanesweep_traffic::trajectory::tracks::{LoadedTracks, SYNTHETIC};
@@ -151,11 +150,11 @@ impl Tracks {
         };
         let read = file.understand(Implausible::Accepted)?;
         let report = |LoadedTracks { loaded, mut understanding }| {
-            let (Loaded { recording, vehicle_names, .. }, options) = (loaded, &configured.settings.mining);
-            // As in runs: what noise may do to the scenarios, and those that are left out.
-            let mined = usable(mine(&recording, options).scenarios, Implausible::Refused);
+            // As in runs: what is noted of the scenarios, and those that are left out.
+            let (_, mined) = mine_loaded(&loaded, &configured.settings.mining, Implausible::Refused);
+            let Loaded { recording, vehicle_names, .. } = loaded;
             if understanding.is_usable() {
-                noise_notes(&recording, options).into_iter().for_each(|note| understanding.warn(note));
+                mined.notes.into_iter().for_each(|note| understanding.warn(note));
                 if let Some(first) = mined.problems.first() {
                     let number = mined.problems.len();
                     understanding.warn(format!("{number} more scenarios are left out, the first: {first}"));

@@ -205,6 +205,22 @@ fn what_is_configured_yields_to_a_flag_that_contradicts_it() {
 }
 
 #[test]
+fn mining_settings_without_meaning_are_refused_by_the_check_and_by_runs() {
+    let dir = tempfile::tempdir().unwrap();
+    for (table, words) in [
+        ("[mining]\nleader_max_thw_s = 2000", "expected a number above 0 and at most 60"),
+        ("[mining.longitudinal]\nwindow_s = 25", "expected a number above 0 and at most 10"),
+        ("[mining.lateral]\nnear_share = 0.6", "0.6 is above `mining.lateral.far_share`, 0.5"),
+    ] {
+        std::fs::write(dir.path().join("own.toml"), format!("{table}\n")).unwrap();
+        for line in ["config check own.toml", "study --config own.toml"] {
+            let said = refused(dir.path(), &[], line);
+            assert!(said.contains(words), "{line}: {said}");
+        }
+    }
+}
+
+#[test]
 fn the_default_file_is_written_once_and_sets_what_is_so_anyway() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();

@@ -108,12 +108,15 @@ fn what_is_wrong_with_a_row_per_instant_is_told_with_line_scenario_and_column() 
         ("target_width_m,", "target_wide,", "column `target_wide`", "no such column"),
         (",weather", "", "line 2", "12 fields, but the header has 11"),
         ("72,3.4,rain", "-72,3.4,rain", "line 3, column `target_speed_kmh`", "at least 0"),
+        ("b,,0.1,", "b,,100,", "line 5, column `time_s`, scenario b", "a number of at least 0.1"),
     ];
     for (old, new, place, problem) in cases {
         assert!(INSTANTS.contains(old), "{old}");
         let error = of("s.csv", &INSTANTS.replacen(old, new, 1)).expect_err(new);
         let text = error.to_string();
         assert!(text.contains(place) && text.contains(problem), "{new}: {text}");
+        let windows = of("s.csv", &INSTANTS.replacen(old, new, 1).replace('\n', "\r\n")).expect_err(new);
+        assert!(windows.to_string().contains(place), "{windows}");
         assert!(error.help().is_some_and(|help| !help.is_empty()), "{text}");
     }
     let rows: Vec<&str> = INSTANTS.lines().collect();
@@ -197,6 +200,8 @@ fn what_is_wrong_with_parameters_is_told_with_line_and_column() {
         let error = of("p.csv", &CASES.replacen(old, new, 1)).expect_err(new);
         let text = error.to_string();
         assert!(text.contains(place) && text.contains(problem), "{new}: {text}");
+        let windows = of("s.csv", &INSTANTS.replacen(old, new, 1).replace('\n', "\r\n")).expect_err(new);
+        assert!(windows.to_string().contains(place), "{windows}");
         assert!(error.help().unwrap().contains(help), "{new}: {:?}", error.help());
     }
     // A column of one's own changes nothing.

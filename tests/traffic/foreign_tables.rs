@@ -220,7 +220,7 @@ fn numbers_that_fit_one_another_badly_are_told() {
         table
     };
     for (table, name, told) in [
-        (scaled(&["vx", "vy"], 1.04), "distance", "0.962 times as far"),
+        (scaled(&["vx", "vy"], 1.04), "distance", "0.9615 times as far"),
         (scaled(&["length"], 0.5), "vehicles", "cars of 2."),
         (scaled(&["y", "vy"], 0.7), "lanes", "3 lanes of 2.4"),
         (with_accelerations(0.6, 0.0), "peaks", "0.60 times the changes of speed"),
@@ -230,7 +230,7 @@ fn numbers_that_fit_one_another_badly_are_told() {
         assert!(fact(&about, name).contains(told), "{told}: {:?}", about.facts);
     }
     let good = understood(&with_accelerations(1.0, 0.0)).unwrap();
-    assert!(fact(&good, "distance").starts_with("1.00 times"), "{:?}", good.facts);
+    assert!(fact(&good, "distance").starts_with("1.000 times"), "{:?}", good.facts);
     assert!(fact(&good, "peaks").starts_with("accelerations are 0.99 times"), "{:?}", good.facts);
 }
 

@@ -13,5 +13,6 @@ mod mining_activities;
 mod mining_claims;
 mod mining_recordings;
 mod noise;
+mod silent_faults;
 mod sumo_and_ngsim;
 mod tracks;

@@ -1,7 +1,8 @@
 //! Noise decides nothing in silence: rounded positions, rounded speeds and one speed per vehicle are said, and good tracks are not doubted.
 
+use lanesweep::model::plausibility::Implausible;
 use lanesweep::scenario::Category;
-use lanesweep::traffic::mining::{MiningOptions, count, mine, noise_notes};
+use lanesweep::traffic::mining::{MiningOptions, count, mine, mine_loaded};
 use lanesweep::traffic::trajectory::Recording;
 use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
 
@@ -34,9 +35,9 @@ fn mined(table: &Plain, smoothing_s: Option<f64>) -> (u64, Vec<String>) {
     let read = crate::traffic::tracks::read(table, &|preset| preset.smoothing_s = smoothing_s).unwrap();
     let graves: Vec<_> = read.understanding.findings.iter().filter(|finding| finding.is_grave).collect();
     assert!(graves.is_empty(), "{graves:?}");
-    let options = MiningOptions::default();
-    let scenarios = mine(&read.loaded.recording, &options).scenarios;
-    (count(&scenarios, Category::Lvd).kept, noise_notes(&read.loaded.recording, &options))
+    let (_, mut found) = mine_loaded(&read.loaded, &MiningOptions::default(), Implausible::Refused);
+    found.notes.retain(|note| note.contains("noise can decide"));
+    (count(&found.scenarios, Category::Lvd).kept, found.notes)
 }
 
 /// Kept leader decelerations by the exact speeds.
@@ -48,10 +49,7 @@ fn right() -> u64 {
 
 #[test]
 fn good_tracks_have_no_note_of_noise() {
-    let options = MiningOptions::default();
-    let exact = recording();
-    assert_eq!(noise_notes(&exact, &options), Vec::<String>::new());
-    let with_speeds = Plain::of(&exact, 1).without(&["heading", "speed"]);
+    let with_speeds = Plain::of(&recording(), 1).without(&["heading", "speed"]);
     for table in [rounded(with_speeds, &["x", "y", "vx", "vy"], 0.01), without_speeds(f64::INFINITY)] {
         assert_eq!(mined(&table, None), (right(), Vec::new()));
     }

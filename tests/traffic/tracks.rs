@@ -345,6 +345,8 @@ fn mistakes_in_a_preset_are_not_silent() {
     };
     let error = with("speed = \"sped\"", "").unwrap_err().to_string();
     assert!(error.contains("`speed`") && error.contains("did you mean `speed`"), "{error}");
+    let error = with("speed = \"speed\"", "smoothing_s = 25.0").unwrap_err().to_string();
+    assert!(error.contains("smoothing_s: 25 is out of range"), "{error}");
     assert!(!with("speed = \"speed\"\ndirection = \"length\"", "").unwrap().is_usable());
     assert!(!with("speed = \"speed\"", "frame_rate_hz = 50.0").unwrap().is_usable());
     assert!(!with("lane = \"class\"", "").unwrap().is_usable());

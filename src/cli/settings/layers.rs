@@ -214,10 +214,13 @@ impl Layers {
     /// The values as typed settings.
     ///
     /// # Errors
-    /// [`Error::Internal`] if the types refuse what the checks accepted.
+    /// As `MiningOptions::validate`, for values that contradict one another; [`Error::Internal`] if the types refuse what the
+    /// checks accepted.
     pub(crate) fn settings(&self) -> Result<Settings> {
         let refused = |e: serde_json::Error| Error::Internal(format!("a checked configuration is refused: {e}"));
-        serde_json::from_value(self.tree()).map_err(refused)
+        let settings: Settings = serde_json::from_value(self.tree()).map_err(refused)?;
+        settings.mining.validate()?;
+        Ok(settings)
     }
 }
 

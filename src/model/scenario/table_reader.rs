@@ -261,7 +261,9 @@ fn column_of(leaves: &[Leaf], chosen: &[Chosen], field: &str) -> String {
     let (stem, index) = field.find('[').map_or((field, ""), |at| field.split_at(at));
     let flat = stem.replace('.', "_");
     let is = |column: &&Chosen| leaves.get(column.field).is_some_and(|leaf| leaf.flat == flat);
-    format!("{}{index}", chosen.iter().find(is).map_or(flat.as_str(), |column| &column.column))
+    // Without a column for the rate, it is that of the times.
+    let absent = if flat == "fps" { "time_s" } else { &flat };
+    format!("{}{index}", chosen.iter().find(is).map_or(absent, |column| &column.column))
 }
 
 /// Samples per second of equidistant instants; at least one instant. An error gives the index of the deviating instant.

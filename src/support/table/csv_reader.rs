@@ -20,6 +20,8 @@ pub(super) struct CsvRows {
     record: csv::StringRecord,
     wanted: Vec<usize>,
     decimal_commas: bool,
+    /// The reader counts a Windows line end to the next row.
+    lines_off: u64,
 }
 
 /// A file that returns an error after a budget of bytes.
@@ -76,11 +78,14 @@ impl CsvRows {
         text.by_ref().take(START_BYTES).read_to_end(&mut start).map_err(|e| Error::io(path, "read", e))?;
         let delimiter = delimiter_of(&start);
         let decimal_commas = delimiter != b',' && has_decimal_commas(&start, delimiter);
+        let has_windows_ends =
+            start.split_inclusive(|byte| *byte == b'\n').next().is_some_and(|line| line.ends_with(b"\r\n"));
         let file = BudgetedFile { file: BufReader::new(Box::new(Cursor::new(start).chain(text))), left: MAX_ROW_BYTES };
         let reader = csv::ReaderBuilder::new().trim(csv::Trim::All).delimiter(delimiter).from_reader(file);
         let (path, record) = (path.to_path_buf(), csv::StringRecord::new());
-        let mut rows = CsvRows { path, reader, record, wanted: Vec::new(), decimal_commas };
-        let header = rows.reader.headers().cloned().map_err(|e| csv_error(&rows.path, e))?;
+        let mut rows = CsvRows { path, reader, record, wanted: Vec::new(), decimal_commas, lines_off: 0 };
+        let header = rows.reader.headers().cloned().map_err(|e| rows.error(e))?;
+        rows.lines_off = u64::from(has_windows_ends);
         let columns: Vec<String> =
             header.iter().map(|name| name.trim_start_matches('\u{feff}').trim().to_owned()).collect();
         rows.wanted = (0..columns.len()).collect();
@@ -97,7 +102,7 @@ impl TableRows for CsvRows {
     fn step(&mut self) -> Result<bool> {
         loop {
             self.reader.get_mut().left = MAX_ROW_BYTES;
-            let is_row = self.reader.read_record(&mut self.record).map_err(|e| csv_error(&self.path, e))?;
+            let is_row = self.reader.read_record(&mut self.record).map_err(|e| self.error(e))?;
             // Spreadsheets write rows of empty fields below a table.
             if !is_row || self.record.iter().any(|field| !field.is_empty()) {
                 return Ok(is_row);
@@ -117,30 +122,30 @@ impl TableRows for CsvRows {
         if !self.step()? {
             return Ok(None);
         }
-        let number = self.record.position().map_or(0, csv::Position::line);
+        let number = self.record.position().map_or(0, |position| position.line() + self.lines_off);
         let value = |at| if let Cell::Text(text) = self.cell(at) { Value::from(text) } else { Value::Null };
         Ok(Some(Row { number, values: (0..self.wanted.len()).map(value).collect() }))
     }
 }
 
-fn csv_error(path: &Path, error: csv::Error) -> Error {
-    let place = |position: &Option<csv::Position>| {
-        position.as_ref().map_or(Place::file(path), |position| Place::file(path).row(position.line()))
-    };
-    let line = error.position().map(csv::Position::line);
-    match error.into_kind() {
-        csv::ErrorKind::Io(source) if source.kind() == std::io::ErrorKind::OutOfMemory => Error::input(
-            line.map_or(Place::file(path), |line| Place::file(path).row(line)),
-            format!("a row is longer than {} MiB", MAX_ROW_BYTES >> 20),
-            "look for a quote that is not closed",
-        ),
-        csv::ErrorKind::Io(source) => Error::io(path, "read", source),
-        csv::ErrorKind::Utf8 { pos, .. } => Error::input(place(&pos), "not UTF-8 text", "save the file as UTF-8"),
-        csv::ErrorKind::UnequalLengths { pos, expected_len, len } => Error::input(
-            place(&pos),
-            format!("{len} fields, but the header has {expected_len}"),
-            "give every row one field per column; texts with commas need quotes",
-        ),
-        other => Error::input(Place::file(path), format!("not CSV: {other:?}"), "write one row a line"),
+impl CsvRows {
+    fn error(&self, error: csv::Error) -> Error {
+        let (file, line) = (Place::file(&self.path), error.position().map(|position| position.line() + self.lines_off));
+        let place = line.map_or(file.clone(), |line| file.clone().row(line));
+        match error.into_kind() {
+            csv::ErrorKind::Io(source) if source.kind() == std::io::ErrorKind::OutOfMemory => Error::input(
+                place,
+                format!("a row is longer than {} MiB", MAX_ROW_BYTES >> 20),
+                "look for a quote that is not closed",
+            ),
+            csv::ErrorKind::Io(source) => Error::io(&self.path, "read", source),
+            csv::ErrorKind::Utf8 { .. } => Error::input(place, "not UTF-8 text", "save the file as UTF-8"),
+            csv::ErrorKind::UnequalLengths { expected_len, len, .. } => Error::input(
+                place,
+                format!("{len} fields, but the header has {expected_len}"),
+                "give every row one field per column; texts with commas need quotes",
+            ),
+            other => Error::input(file, format!("not CSV: {other:?}"), "write one row a line"),
+        }
     }
 }

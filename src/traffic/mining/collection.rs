@@ -1,10 +1,10 @@
 //! Many recordings at once: read and mined in parallel, one file per thread in memory at a time and as many as memory may
 //! hold, the result in the recordings' order. A recording that cannot be read is reported; the others are used.
 
-use std::collections::HashSet;
+use std::cmp::Reverse;
+use std::collections::{HashMap, HashSet};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::Path;
-use std::sync::{Condvar, Mutex, PoisonError};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -14,7 +14,7 @@ use super::noise::noise_notes;
 use super::options::MiningOptions;
 use super::{cut_in, cut_out, lvd};
 use crate::trajectory::generator::{GeneratorOptions, generate_one};
-use crate::trajectory::{FileChecksum, InputFile, Inputs, Loaded, Recording};
+use crate::trajectory::{FileChecksum, FrameIndex, InputFile, Inputs, Loaded, Recording, VehicleAtFrame};
 use lanesweep_model::plausibility::Implausible;
 use lanesweep_model::scenario::{Category, Scenario, ScenarioFile, mined_id, usable};
 use lanesweep_support::{Error, Place, Result, option, readable};
@@ -41,9 +41,9 @@ pub struct RecordingSummary {
     /// Name and checksum of the preset that the files were read by; none for highD's format and generated recordings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub preset: Option<String>,
-    /// Equal for recordings in which all vehicles have the same positions.
+    /// A number for each instant of a carriageway with several vehicles, equal where all positions are.
     #[serde(skip)]
-    content: u64,
+    content: Vec<u64>,
 }
 
 /// Scenarios of many recordings.
@@ -143,49 +143,13 @@ const MAX_BYTES_AT_A_TIME: u64 = 4 << 30;
 /// A file that gzip compressed has about this many times its size.
 const UNPACKED: u64 = 8;
 
-/// Bytes of files that may still be read. Reading and mining a file start no work on other threads, else a thread could wait for
-/// another turn within its own.
-struct Turns {
-    left: Mutex<u64>,
-    freed: Condvar,
-}
-
-impl Default for Turns {
-    fn default() -> Self {
-        Turns { left: Mutex::new(MAX_BYTES_AT_A_TIME), freed: Condvar::new() }
-    }
-}
-
-impl Turns {
-    /// Waits until a file may be read; its turn ends with the returned value.
-    fn of(&self, file: &InputFile) -> Turn<'_> {
-        let size = |path: &std::path::PathBuf| {
-            let bytes = std::fs::metadata(path).map_or(0, |file| file.len());
-            if path.extension().is_some_and(|ending| ending == "gz") { UNPACKED * bytes } else { bytes }
-        };
-        let bytes = file.paths().iter().map(size).sum();
-        self.of_bytes(bytes)
-    }
-
-    fn of_bytes(&self, bytes: u64) -> Turn<'_> {
-        let bytes = bytes.min(MAX_BYTES_AT_A_TIME);
-        let left = self.left.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut left = self.freed.wait_while(left, |left| *left < bytes).unwrap_or_else(PoisonError::into_inner);
-        *left -= bytes;
-        Turn { turns: self, bytes }
-    }
-}
-
-struct Turn<'a> {
-    turns: &'a Turns,
-    bytes: u64,
-}
-
-impl Drop for Turn<'_> {
-    fn drop(&mut self) {
-        *self.turns.left.lock().unwrap_or_else(PoisonError::into_inner) += self.bytes;
-        self.turns.freed.notify_all();
-    }
+/// Size of the files of a recording when they are unpacked, bytes.
+fn bytes(file: &InputFile) -> u64 {
+    let size = |path: &std::path::PathBuf| {
+        let bytes = std::fs::metadata(path).map_or(0, |file| file.len());
+        if path.extension().is_some_and(|ending| ending == "gz") { UNPACKED * bytes } else { bytes }
+    };
+    file.paths().iter().map(size).sum()
 }
 
 /// Reads and mines every recording of a folder, or of a file. `done` is called after each file, from any thread; its error
@@ -216,60 +180,61 @@ pub fn mine_inputs(
     let preset = inputs.preset().map(|preset| format!("{} (sha256 {})", preset.name, preset.sha256));
     let (files, problems) = inputs.files();
     let part = |loaded: Loaded| {
-        let mut mined = mine(&loaded.recording, options);
-        let of_noise = noise_notes(&loaded.recording, options);
-        mined.scenarios.iter_mut().for_each(|scenario| name_as_in_file(scenario, &loaded));
-        let ScenarioFile { scenarios, problems, notes: doubts } = usable(mined.scenarios, implausible);
-        mined.scenarios = scenarios;
+        let (data_sets, ScenarioFile { scenarios, problems, notes }) = mine_loaded(&loaded, options, implausible);
+        let mined = Mined { scenarios, data_sets };
         let mut part = Collection::of(&loaded.recording, mined, loaded.checksum_sha256, options);
         part.recordings[0].preset.clone_from(&preset);
         let name = |note: String| format!("recording {}: {note}", loaded.recording.id);
-        let cut_m = options.ego_view.cut_m;
-        let no_ego = (part.recordings[0].data_sets == 0)
-            .then(|| format!("no vehicle drives {cut_m} m in view (`ego_view.cut_m`), so none is an ego: lower it"));
-        part.notes = loaded.notes.into_iter().chain(doubts).chain(of_noise).chain(no_ego).map(name).collect();
+        part.notes = loaded.notes.into_iter().chain(notes).map(name).collect();
         Collection { problems, ..part }
     };
-    let turns = Turns::default();
-    // The outer error ends the work; an inner one leaves out a file.
-    let parts: Result<Vec<Result<Vec<Collection>>>> = files
-        .par_iter()
-        .with_max_len(1)
-        .map(|file| {
-            let _turn = turns.of(file);
-            let parts = file.read(implausible).map(|all| all.into_iter().map(part).collect());
-            done()?;
-            Ok(parts)
-        })
-        .collect();
-    let mut collection = Collection { problems, ..Collection::default() };
-    let mut names = HashSet::new();
-    for parts in parts? {
-        match parts {
-            Ok(parts) => {
-                for part in parts {
-                    let own = &part.recordings[0];
-                    let problem = match collection.recordings.iter().find(|of| of.content == own.content) {
-                        _ if names.contains(&own.id) => "another file has a recording of this name".to_owned(),
-                        Some(other) => format!("it is recording {} again: all positions are equal", other.id),
-                        None => {
-                            names.insert(own.id.clone());
-                            collection.add(part);
-                            continue;
-                        }
-                    };
-                    let place = Place::item(format!("recording {}", own.id));
-                    let help = "rename one of the files, or remove it if it is a copy";
-                    collection.problems.push(Error::input(place, problem, help));
-                }
-            }
-            Err(error) => collection.problems.push(error),
-        }
+    let mut sum = 0;
+    // A batch of files that memory holds at once; the first file of another begins it.
+    let batches = files.chunk_by(|before, next| {
+        sum += bytes(before);
+        let is_same = sum + bytes(next) <= MAX_BYTES_AT_A_TIME;
+        sum = if is_same { sum } else { 0 };
+        is_same
+    });
+    let mut all = Vec::new();
+    for batch in batches {
+        // The outer error ends the work; an inner one leaves out a file.
+        let parts: Result<Vec<Result<Vec<Collection>>>> = batch
+            .par_iter()
+            .with_max_len(1)
+            .map(|file| {
+                let parts = file.read(implausible).map(|all| all.into_iter().map(part).collect());
+                done()?;
+                Ok(parts)
+            })
+            .collect();
+        all.extend(parts?);
     }
+    let mut collection = Collection { problems, ..Collection::default() };
+    let mut usable = Vec::new();
+    for parts in all {
+        parts.map_or_else(|error| collection.problems.push(error), |parts| usable.extend(parts));
+    }
+    add_once(usable, &mut collection);
     if collection.recordings.is_empty() && !collection.problems.is_empty() {
         return Err(collection.problems.swap_remove(0));
     }
     Ok(collection)
+}
+
+/// The number of data sets of a recording, its usable scenarios with the frames and names of the file, and what to know of them.
+pub fn mine_loaded(loaded: &Loaded, options: &MiningOptions, implausible: Implausible) -> (u64, ScenarioFile) {
+    let mut mined = mine(&loaded.recording, options);
+    mined.scenarios.iter_mut().for_each(|scenario| name_as_in_file(scenario, loaded));
+    let mut found = usable(mined.scenarios, implausible);
+    found.notes.extend(noise_notes(&loaded.recording, options));
+    if mined.data_sets == 0 {
+        let cut_m = options.ego_view.cut_m;
+        found
+            .notes
+            .push(format!("no vehicle drives {cut_m} m in view (`ego_view.cut_m`), so none is an ego: lower it"));
+    }
+    (mined.data_sets, found)
 }
 
 /// Gives a scenario the frames of its file, and an id with the names of its vehicles there.
@@ -314,13 +279,56 @@ pub fn mine_generated(
     Ok(collection)
 }
 
-/// A checksum of all positions.
-fn content(recording: &Recording) -> u64 {
-    let mut hash = DefaultHasher::new();
-    for value in recording.tracks.iter().flat_map(|track| track.s_m.iter().chain(&track.d_m)) {
-        value.to_bits().hash(&mut hash);
+/// Recordings with more of their instants in others count them twice.
+const MAX_REPEATED: f64 = 0.05;
+
+/// Adds recordings but those whose name a larger one has, and those that are a larger one again, all or in part: problems.
+fn add_once(parts: Vec<Collection>, to: &mut Collection) {
+    let mut order: Vec<usize> = (0..parts.len()).collect();
+    order.sort_by_key(|at| Reverse(parts[*at].recordings[0].samples));
+    let (mut names, mut first_of, mut wrong) = (HashSet::new(), HashMap::new(), HashMap::new());
+    for at in order {
+        let own = &parts[at].recordings[0];
+        let others: Vec<usize> = own.content.iter().filter_map(|instant| first_of.get(instant).copied()).collect();
+        if !names.insert(&own.id) {
+            let problem = "another file has a recording of this name".to_owned();
+            wrong.insert(at, (problem, "rename one of the files, or remove it if it is a copy"));
+        } else if others.len() as f64 > MAX_REPEATED * own.content.len() as f64 {
+            let (percent, other) = (100 * others.len() / own.content.len(), &parts[others[0]].recordings[0].id);
+            let problem = format!(
+                "it is recording {other} again: at {percent} % of its instants all positions are equal, and their hours would count twice"
+            );
+            wrong.insert(at, (problem, "remove it, or the part that is in both; the longer recording is used"));
+        } else {
+            first_of.extend(own.content.iter().map(|instant| (*instant, at)));
+        }
     }
-    hash.finish()
+    for (at, part) in parts.into_iter().enumerate() {
+        match wrong.remove(&at) {
+            Some((problem, help)) => {
+                let place = Place::item(format!("recording {}", part.recordings[0].id));
+                to.problems.push(Error::input(place, problem, help));
+            }
+            None => to.add(part),
+        }
+    }
+}
+
+/// A checksum of all positions at each instant of a carriageway: those of one vehicle alone may occur twice in simulations.
+fn content(recording: &Recording) -> Vec<u64> {
+    let of_instant = |present: &[VehicleAtFrame]| {
+        let mut hash = DefaultHasher::new();
+        for at in present {
+            let d_m = recording.tracks[at.track as usize].d_m[at.sample as usize];
+            (at.s_m.to_bits(), d_m.to_bits()).hash(&mut hash);
+        }
+        hash.finish()
+    };
+    let of = |carriageway: usize| {
+        let index = FrameIndex::new(recording, carriageway);
+        index.frames().filter(|present| present.len() > 1).map(of_instant).collect::<Vec<u64>>()
+    };
+    (0..recording.carriageways.len()).flat_map(of).collect()
 }
 
 /// Time and distance of all ego data sets, from each ego's first sample to its last with tags: the exposure.

@@ -41,7 +41,9 @@ pub(crate) fn leave_out_copies(scenarios: &mut Vec<Scenario>) -> Vec<String> {
             let (earlier, later) = (first.min(second), first.max(second));
             is_copy[later] = numbers(a).eq(numbers(b));
             let list = if is_copy[later] { &mut copies } else { &mut near };
-            list.push((later, format!("{} is {}", scenarios[later].id, scenarios[earlier].id)));
+            let [earlier, again] = [earlier, later].map(|at| &scenarios[at]);
+            let hours = if earlier.recording == again.recording { "" } else { "; the hours of both recordings count" };
+            list.push((later, format!("{} is {}{hours}", again.id, earlier.id)));
         }
     }
     let mut place = 0..;

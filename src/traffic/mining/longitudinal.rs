@@ -113,23 +113,19 @@ fn remove_short_cruising(v: &[f64], events: &[LongitudinalEvent], min_cruise: f6
     let mut i = 0;
     while i < events.len() {
         let event = events[i];
-        let (Some(before), Some(&after)) = (kept.last().copied(), events.get(i + 1)) else {
+        i += 1;
+        // The product of two numbers may be rounded (4 s at 29.97 Hz); it is compared with whole samples.
+        let is_short = |after: &LongitudinalEvent| ((after.start - event.start) as f64) < min_cruise - 1e-6;
+        let after = events.get(i).filter(|after| event.activity == Longitudinal::Cruising && is_short(after));
+        let Some((before, &after)) = kept.last().zip(after) else {
             kept.push(event);
-            i += 1;
             continue;
         };
-        // The product of two numbers may be rounded (4 s at 29.97 Hz); it is compared with whole samples.
-        let short = ((after.start - event.start) as f64) < min_cruise - 1e-6;
-        if event.activity != Longitudinal::Cruising || !short {
-            kept.push(event);
-            i += 1;
-            continue;
-        }
         if before.activity != after.activity {
             let start = last_extremum(v, event.start, after.start, after.activity);
             kept.push(LongitudinalEvent { start, ..after });
         }
-        i += 2;
+        i += 1;
     }
     kept
 }

@@ -29,11 +29,10 @@ pub mod tags;
 
 pub(super) use collection::filter_given;
 pub use collection::{
-    Collection, RecordingSummary, count, counts, counts_text, mine_folder, mine_generated, mine_inputs,
+    Collection, RecordingSummary, count, counts, counts_text, mine_folder, mine_generated, mine_inputs, mine_loaded,
 };
 pub(super) use copies::leave_out_copies;
 pub use miner::{CategoryCount, Mined, mine};
-pub use noise::noise_notes;
 pub use options::{
     CutInOptions, CutOutOptions, LaneChangeEnd, LateralOptions, LongitudinalOptions, LvdOptions, MiningOptions,
 };

@@ -10,7 +10,7 @@ const MAX_FRACTION: f64 = 0.3;
 const LATERAL_DEVIATIONS: f64 = 4.0;
 
 /// Notes on a recording whose noise can decide what is mined; none for good data.
-pub fn noise_notes(recording: &Recording, options: &MiningOptions) -> Vec<String> {
+pub(super) fn noise_notes(recording: &Recording, options: &MiningOptions) -> Vec<String> {
     let noise = Noise::of(recording);
     let mut notes = Vec::new();
     let threshold = options.lvd.min_peak_deceleration_mps2;

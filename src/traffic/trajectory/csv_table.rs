@@ -214,18 +214,13 @@ impl CsvTable {
     /// # Errors
     /// If it is not a number, infinite, NaN or out of range.
     pub(super) fn real(&self, column: CsvColumn) -> Result<f64> {
-        match number::real(self.bytes(column)) {
-            Some(value) if value.abs() <= number::REAL_LIMIT => Ok(value),
-            Some(value) if value.is_finite() => {
-                Err(self.bad(column, format!("{} is out of range", self.shown(column)), "correct the value"))
-            }
-            Some(_) => Err(self.bad(
-                column,
-                format!("{} is not finite; expected a finite number", self.shown(column)),
-                "correct the value, or remove the vehicle from the recording",
-            )),
-            None => Err(self.not_a_number(column, "a number")),
+        let value = number::real(self.bytes(column)).ok_or_else(|| self.not_a_number(column, "a number"))?;
+        if value.abs() <= number::REAL_LIMIT {
+            return Ok(value);
         }
+        let what = if value.is_finite() { "out of range" } else { "not finite; expected a finite number" };
+        let help = "correct the value, or remove the vehicle from the recording";
+        Err(self.bad(column, format!("{} is {what}", self.shown(column)), help))
     }
 
     /// A field as a finite number above zero.
@@ -335,67 +330,50 @@ impl CsvTable {
     }
 
     fn check_header(&self) -> Result<()> {
-        let place = || Place::file(&self.path).row(1);
-        if self.record.iter().any(|field| field.contains(&0)) {
-            return Err(Error::input(
-                place(),
-                "the header contains zero bytes; expected UTF-8 text with comma-separated column names",
-                "save the file as UTF-8 (it may be UTF-16) or export it again",
-            ));
-        }
-        if let [only] = self.header.as_slice()
-            && let Some(separator) = [';', '\t'].into_iter().find(|&separator| only.contains(separator))
-        {
-            return Err(Error::input(
-                place(),
-                format!("the fields are separated by {separator:?}; expected commas"),
-                "export the file with commas between the fields and points in the numbers",
-            ));
-        }
-        Ok(())
+        let is_other = |separator: &char| matches!(&self.header[..], [only] if only.contains(*separator));
+        let (problem, help) = if self.record.iter().any(|field| field.contains(&0)) {
+            let problem = "the header contains zero bytes; expected UTF-8 text with comma-separated column names";
+            (problem.to_owned(), "save the file as UTF-8 (it may be UTF-16) or export it again")
+        } else if let Some(separator) = [';', '\t'].iter().find(|separator| is_other(separator)) {
+            let help = "export the file with commas between the fields and points in the numbers";
+            (format!("the fields are separated by {separator:?}; expected commas"), help)
+        } else {
+            return Ok(());
+        };
+        Err(Error::input(Place::file(&self.path).row(1), problem, help))
     }
 
     fn wrong_field_count(&mut self) -> Error {
-        let place = self.place();
-        let (found, expected) = (self.record.len(), self.header.len());
-        let problem = format!("the line has {found} fields; expected {expected}, as many as the header");
-        if self.inner_line_ends() > 0 {
-            return Error::input(
-                place,
-                format!("{problem}: a quotation mark is opened and not closed on this line"),
+        let (place, found, expected) = (self.place(), self.record.len(), self.header.len());
+        let has_open_quote = self.inner_line_ends() > 0;
+        let (more, help) = if has_open_quote {
+            (
+                ": a quotation mark is opened and not closed on this line",
                 "remove the quotation mark; the format needs none",
-            );
-        }
-        if found > expected {
-            return Error::input(
-                place,
-                problem,
-                "remove the surplus fields (a comma inside a number counts as a separator)",
-            );
-        }
-        let last = self.ends_open() || matches!(self.reader.read_byte_record(&mut self.record), Ok(false));
-        if last {
-            Error::input(
-                place,
-                format!("{problem}. It is the last line: the file is truncated"),
-                "copy or export the file again",
             )
+        } else if found > expected {
+            ("", "remove the surplus fields (a comma inside a number counts as a separator)")
+        } else if self.ends_open() || matches!(self.reader.read_byte_record(&mut self.record), Ok(false)) {
+            (". It is the last line: the file is truncated", "copy or export the file again")
         } else {
-            Error::input(place, problem, "complete the line or remove it")
-        }
+            ("", "complete the line or remove it")
+        };
+        let problem = format!("the line has {found} fields; expected {expected}, as many as the header{more}");
+        Error::input(place, problem, help)
     }
 
     fn not_a_number(&self, column: CsvColumn, expected: &str) -> Error {
         let field = self.bytes(column);
-        if field.trim_ascii().is_empty() {
-            return self.bad(column, format!("the field is empty; expected {expected}"), "fill in the value");
-        }
-        let help = if std::str::from_utf8(field).is_err() {
-            "save the file as UTF-8 or export it again"
-        } else {
-            "correct the value"
+        let (problem, help) = match std::str::from_utf8(field) {
+            _ if field.trim_ascii().is_empty() => {
+                (format!("the field is empty; expected {expected}"), "fill in the value")
+            }
+            Ok(_) => (format!("{} is not {expected}", self.shown(column)), "correct the value"),
+            Err(_) => {
+                (format!("{} is not {expected}", self.shown(column)), "save the file as UTF-8 or export it again")
+            }
         };
-        self.bad(column, format!("{} is not {expected}", self.shown(column)), help)
+        self.bad(column, problem, help)
     }
 }
 

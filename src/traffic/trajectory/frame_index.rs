@@ -83,7 +83,7 @@ impl FrameIndex {
     }
 
     /// The vehicles of each frame that has some, in the order of the frames.
-    pub(super) fn frames(&self) -> impl Iterator<Item = &[VehicleAtFrame]> {
+    pub(crate) fn frames(&self) -> impl Iterator<Item = &[VehicleAtFrame]> {
         (0..self.begin.len() - 1).map(|slot| self.slot(slot))
     }
 

@@ -14,8 +14,7 @@ use lanesweep_support::{Error, Place, Result, option};
 /// Recordings whose format is known: highD's, or that of a preset.
 #[derive(Debug, Default)]
 pub struct Inputs {
-    highd: Vec<HighdFiles>,
-    tracks: Vec<TrackFile>,
+    files: Vec<InputFile>,
     /// What is wrong with recordings, or with other files that could be tracks.
     problems: Vec<Error>,
     preset: Option<Preset>,
@@ -37,8 +36,9 @@ impl Inputs {
     /// [`Error::Io`]; [`Error::Input`] if there is no recording, or if no preset fits; those of [`Preset::load`].
     pub fn of(path: &Path, preset: Option<&str>) -> Result<Inputs> {
         let with = |preset: Preset| {
-            let tracks = tracks::track_files(path, &preset)?;
-            Ok(Inputs { tracks, preset: Some(preset), ..Inputs::default() })
+            let of = |file| InputFile::Tracks(file, Box::new(preset.clone()));
+            let files = tracks::track_files(path, &preset)?.into_iter().map(of).collect();
+            Ok(Inputs { files, preset: Some(preset), ..Inputs::default() })
         };
         match preset {
             Some(HIGHD) => return highd_inputs(path),
@@ -49,7 +49,8 @@ impl Inputs {
             return highd_inputs(path);
         }
         if !path.is_dir() {
-            let has_meta = is_highd_name(path) && highd_inputs(path).is_ok_and(|of| of.highd[0].is_complete());
+            let is_whole = |of: Inputs| matches!(&of.files[..], [InputFile::Highd(files)] if files.is_complete());
+            let has_meta = is_highd_name(path) && highd_inputs(path).is_ok_and(is_whole);
             return match tracks::detect(path)? {
                 Some(preset) if preset.is_generic() && has_meta => highd_inputs(path),
                 Some(preset) => with(preset),
@@ -95,7 +96,7 @@ impl Inputs {
             }
         }
         for (file, found) in foreign {
-            self.tracks.retain(|track| track.path != file);
+            self.files.retain(|of| of.paths()[0] != file);
             let has_ending = tracks::ending(&file_name(&file)).is_some_and(|ending| endings.contains(&ending));
             match found {
                 Ok(Some(other)) => {
@@ -118,14 +119,12 @@ impl Inputs {
 
     /// Number of files of recordings.
     pub(crate) fn count(&self) -> usize {
-        self.highd.len() + self.tracks.len()
+        self.files.len()
     }
 
     /// The files, and what is wrong with others.
     pub fn files(self) -> (Vec<InputFile>, Vec<Error>) {
-        let with_preset = |file| Some(InputFile::Tracks(file, Box::new(self.preset.clone()?)));
-        let tracks = self.tracks.into_iter().filter_map(with_preset);
-        (self.highd.into_iter().map(InputFile::Highd).chain(tracks).collect(), self.problems)
+        (self.files, self.problems)
     }
 }
 
@@ -196,11 +195,12 @@ fn is_highd_name(path: &Path) -> bool {
 fn highd_inputs(path: &Path) -> Result<Inputs> {
     if path.is_dir() || !is_highd_name(path) {
         let highd::Inventory { recordings, problems } = highd::inventory(path)?;
-        return Ok(Inputs { highd: recordings, problems, ..Inputs::default() });
+        let files = recordings.into_iter().map(InputFile::Highd).collect();
+        return Ok(Inputs { files, problems, ..Inputs::default() });
     }
     let name = file_name(path);
     let id = unpacked(&name).strip_suffix(HIGHD_ENDING).unwrap_or(&name);
-    Ok(Inputs { highd: vec![HighdFiles::found(folder_of(path), id)], ..Inputs::default() })
+    Ok(Inputs { files: vec![InputFile::Highd(HighdFiles::found(folder_of(path), id))], ..Inputs::default() })
 }
 
 /// The first file of a folder that may hold tracks; those with highD's names come first.

@@ -17,7 +17,7 @@ mod recording;
 pub mod tracks;
 
 pub use csv_table::FileChecksum;
-pub(crate) use frame_index::FrameIndex;
+pub(crate) use frame_index::{FrameIndex, VehicleAtFrame};
 pub use inputs::{InputFile, Inputs};
 pub(crate) use noise::Noise;
 pub(crate) use recording::LIMIT_TOLERANCE_M;

@@ -18,18 +18,9 @@ const OVER_NOISE: f64 = 8.0;
 pub(super) const JUMP_ALONG_M: f64 = 2.0;
 pub(super) const JUMP_ACROSS_M: f64 = 0.8;
 
-/// Vehicles with samples that cannot be.
-pub(super) struct Impossible {
-    /// How many.
-    pub vehicles: usize,
-    /// The first of them, and its frame.
-    pub first: (u32, i64),
-    /// What cannot be.
-    pub problem: String,
-}
-
-/// The samples whose speed contradicts the positions, or whose acceleration is beyond what is physical; `None` without any.
-pub(super) fn impossible(recording: &Recording) -> Option<Impossible> {
+/// Vehicles with samples whose speed contradicts the positions, or whose acceleration is beyond what is physical: how many, and
+/// the first of them with its frame and problem in words; `None` without any.
+pub(super) fn impossible(recording: &Recording) -> Option<(usize, String)> {
     let rate_hz = recording.frame_rate_hz;
     // Once, and only where it is needed.
     let noise_mps2 = std::cell::OnceCell::new();
@@ -42,8 +33,8 @@ pub(super) fn impossible(recording: &Recording) -> Option<Impossible> {
     };
     let mut found = recording.tracks.iter().filter_map(|track| Some((track, of_track(track)?)));
     let (track, (k, problem)) = found.next()?;
-    let first = (track.id, track.first_frame + k as i64);
-    Some(Impossible { vehicles: 1 + found.count(), first, problem })
+    let first = format!("vehicle {} at frame {}: {problem}", track.id, track.first_frame + k as i64);
+    Some((1 + found.count(), first))
 }
 
 fn contradicting_speed(track: &Track, rate_hz: f64) -> Option<(usize, String)> {

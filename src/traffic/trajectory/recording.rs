@@ -174,11 +174,11 @@ settings! {
     #[serde(default, deny_unknown_fields)]
     pub struct EgoViewOptions {
         /// Farthest along-road distance, centre to centre, at which another vehicle is in view, m. Paper: 100.
-        #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
+        #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e3))]
         pub range_m: f64 = 100.0,
         /// Distance before the ego's final position at which the view ends, m; vehicles that travel less have
         /// no view. Paper: 100.
-        #[schemars(range(min = 0.0, max = 1e6))]
+        #[schemars(range(min = 0.0, max = 1e4))]
         pub cut_m: f64 = 100.0,
     }
 }

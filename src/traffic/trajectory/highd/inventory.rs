@@ -113,19 +113,11 @@ fn prefixes(dir: &Path) -> Result<BTreeMap<String, [bool; 3]>> {
         ));
     }
     let mut found: BTreeMap<String, [bool; 3]> = BTreeMap::new();
-    for entry in fs::read_dir(dir).map_err(|source| Error::io(dir, "read the folder", source))? {
-        let entry = entry.map_err(|source| Error::io(dir, "read the folder", source))?;
-        // A name that is not UTF-8 cannot be part of a scenario's key. Some systems write additional files with a
-        // leading point.
-        let Ok(name) = entry.file_name().into_string() else { continue };
-        // Not `Path::is_file`, which is false for all files of a folder that may be listed but not entered.
-        let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
-        let leads_nowhere = entry.file_type().is_ok_and(|kind| kind.is_symlink()) && !entry.path().exists();
-        if name.starts_with('.') || is_folder || leads_nowhere {
-            continue;
-        }
+    for path in files_of(dir)?.iter().filter(|path| !path.is_symlink() || path.exists()) {
+        // A name that is not UTF-8 cannot be part of a scenario's key.
+        let Some(name) = path.file_name().and_then(|name| name.to_str()) else { continue };
         for (file, suffix) in SUFFIXES.iter().enumerate() {
-            if let Some(prefix) = input_file::unpacked(&name).strip_suffix(suffix)
+            if let Some(prefix) = input_file::unpacked(name).strip_suffix(suffix)
                 && !prefix.is_empty()
             {
                 found.entry(prefix.to_owned()).or_default()[file] = true;

@@ -6,38 +6,15 @@ use crate::trajectory::{Recording, Track};
 /// No vehicle.
 pub(super) const NOBODY: u32 = u32::MAX;
 
-/// The vehicles around one vehicle at one instant, as indices into [`Recording::tracks`] or [`NOBODY`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Around {
-    /// Next ahead in the same lane.
-    pub preceding: u32,
-    /// Next behind in the same lane.
-    pub following: u32,
-    /// In the next lane to the left.
-    pub left: Beside,
-    /// In the next lane to the right.
-    pub right: Beside,
-}
-
-/// The vehicles of a neighbouring lane.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Beside {
-    /// Next ahead of those that do not overlap along the road.
-    pub preceding: u32,
-    /// The nearest that overlaps along the road.
-    pub alongside: u32,
-    /// Next behind of those that do not overlap along the road.
-    pub following: u32,
-}
-
-const NOBODY_BESIDE: Beside = Beside { preceding: NOBODY, alongside: NOBODY, following: NOBODY };
-
-const ALONE: Around = Around { preceding: NOBODY, following: NOBODY, left: NOBODY_BESIDE, right: NOBODY_BESIDE };
+/// The vehicles around one vehicle at one instant, as indices into [`Recording::tracks`] or [`NOBODY`], in the order of highD's
+/// columns: the next one ahead and behind in the same lane; in the lane to the left, then to the right, the next one ahead of
+/// those that do not overlap along the road, the nearest that overlaps, and the next one behind.
+pub(super) type Around = [u32; 8];
 
 /// The neighbours of each vehicle at each of its samples. Vehicles in no lane have none.
 pub(super) fn neighbours(recording: &Recording) -> Vec<Vec<Around>> {
     let tracks = &recording.tracks;
-    let mut around: Vec<Vec<Around>> = tracks.iter().map(|track| vec![ALONE; track.len()]).collect();
+    let mut around: Vec<Vec<Around>> = tracks.iter().map(|track| vec![[NOBODY; 8]; track.len()]).collect();
     for (index, carriageway) in recording.carriageways.iter().enumerate() {
         // Ascending along the road.
         let mut lanes: Vec<Vec<VehicleAtFrame>> = vec![Vec::new(); carriageway.lane_count()];
@@ -49,46 +26,37 @@ pub(super) fn neighbours(recording: &Recording) -> Vec<Vec<Around>> {
                     vehicles.push(*here);
                 }
             }
-            note(&mut around, tracks, &lanes);
+            for (lane, vehicles) in lanes.iter().enumerate() {
+                let of = |lane: Option<usize>| lane.and_then(|lane| lanes.get(lane)).map_or(&[][..], Vec::as_slice);
+                for (place, &here) in vehicles.iter().enumerate() {
+                    let at = |place: Option<usize>| place.and_then(|at| vehicles.get(at)).map_or(NOBODY, |v| v.track);
+                    let [a, b, c] = beside(tracks, of(lane.checked_sub(1)), here);
+                    let [d, e, f] = beside(tracks, of(Some(lane + 1)), here);
+                    around[here.track as usize][here.sample as usize] =
+                        [at(Some(place + 1)), at(place.checked_sub(1)), a, b, c, d, e, f];
+                }
+            }
         }
     }
     around
 }
 
-fn note(around: &mut [Vec<Around>], tracks: &[Track], lanes: &[Vec<VehicleAtFrame>]) {
-    let beside = |lane: Option<usize>, here: VehicleAtFrame| match lane.and_then(|lane| lanes.get(lane)) {
-        Some(vehicles) => beside(tracks, vehicles, here),
-        None => NOBODY_BESIDE,
-    };
-    for (lane, vehicles) in lanes.iter().enumerate() {
-        for (place, &here) in vehicles.iter().enumerate() {
-            let at = |place: Option<usize>| place.and_then(|place| vehicles.get(place)).map_or(NOBODY, |v| v.track);
-            around[here.track as usize][here.sample as usize] = Around {
-                preceding: at(Some(place + 1)),
-                following: at(place.checked_sub(1)),
-                left: beside(lane.checked_sub(1), here),
-                right: beside(Some(lane + 1), here),
-            };
-        }
-    }
-}
-
-fn beside(tracks: &[Track], vehicles: &[VehicleAtFrame], here: VehicleAtFrame) -> Beside {
+/// Those of a neighbouring lane: ahead, alongside, behind.
+fn beside(tracks: &[Track], vehicles: &[VehicleAtFrame], here: VehicleAtFrame) -> [u32; 3] {
     let length_m = tracks[here.track as usize].length_m;
-    let mut found = NOBODY_BESIDE;
+    let [mut ahead, mut alongside, mut behind] = [NOBODY; 3];
     let mut nearest_m = f64::INFINITY;
     for other in vehicles {
         let ahead_m = other.s_m - here.s_m;
         if ahead_m.abs() < 0.5 * (length_m + tracks[other.track as usize].length_m) {
             if ahead_m.abs() < nearest_m {
-                nearest_m = ahead_m.abs();
-                found.alongside = other.track;
+                (nearest_m, alongside) = (ahead_m.abs(), other.track);
             }
         } else if ahead_m <= 0.0 {
-            found.following = other.track;
-        } else if found.preceding == NOBODY {
-            found.preceding = other.track;
+            behind = other.track;
+        } else if ahead == NOBODY {
+            ahead = other.track;
         }
     }
-    found
+    [ahead, alongside, behind]
 }

@@ -7,7 +7,7 @@ use super::format::{FRAME_LIMIT, TRACKS_HEADER, csv_format};
 use super::inventory::{HighdFiles, made_up};
 use super::meta::{self, RecordingMeta, VehicleMeta};
 use crate::trajectory::csv_table::{CsvColumn, CsvTable};
-use crate::trajectory::{Loaded, NO_LANE, Recording, Track};
+use crate::trajectory::{Loaded, NO_LANE, Recording, Track, number};
 use lanesweep_model::plausibility::{Doubts, HELP, Implausible, Quantity};
 use lanesweep_support::atomic_file::folder_of;
 use lanesweep_support::{Error, Result};
@@ -36,8 +36,9 @@ pub fn read_checked(files: &HighdFiles, implausible: Implausible) -> Result<Load
     let columns = TrackColumns::of(&table)?;
     let reserve = can_hold(&files.tracks, &vehicles);
     let empty = vehicles.iter().map(|vehicle| empty_track(vehicle, reserve)).collect();
-    let tracks = read_tracks(&mut table, &columns, &recording_meta, &vehicles, empty, &mut doubts)?;
+    let (tracks, odd_size) = read_tracks(&mut table, &columns, &recording_meta, &vehicles, empty, &mut doubts)?;
     let mut notes = notes(&columns, &vehicles);
+    notes.extend(odd_size);
     notes.extend(doubts.sentences());
     let checksum_sha256 = vec![table.finish()?, tracks_meta_checksum, recording_meta.checksum];
     let recording = Recording {
@@ -59,6 +60,8 @@ struct TrackColumns {
     velocity_y: CsvColumn,
     acceleration_x: CsvColumn,
     lane: Option<CsvColumn>,
+    /// Length and width, as tracksMeta has them.
+    sizes: Option<[CsvColumn; 2]>,
 }
 
 impl TrackColumns {
@@ -77,11 +80,27 @@ impl TrackColumns {
             velocity_y: table.column("yVelocity")?,
             acceleration_x: table.column("xAcceleration")?,
             lane,
+            sizes: table.optional_column("width")?.zip(table.optional_column("height")?).map(<[CsvColumn; 2]>::from),
         })
     }
 }
 
-/// Fills the empty tracks, one per vehicle, and returns those with samples, ascending by id.
+impl TrackColumns {
+    /// The error for a vehicle that has another size in this line than in tracksMeta.
+    fn other_size(&self, table: &CsvTable, vehicle: &VehicleMeta) -> Option<Error> {
+        let sizes @ [column, _] = self.sizes?;
+        let [length_m, width_m] = sizes.map(|column| number::real(table.bytes(column)));
+        let [length_m, width_m] = [length_m?, width_m?];
+        let off_m = (length_m - vehicle.length_m).abs().max((width_m - vehicle.width_m).abs());
+        (off_m > SAME_SIZE_M).then(|| {
+            let problem = format!("vehicle {} is {length_m} m × {width_m} m here, {} m × {} m in the tracksMeta file", vehicle.id, vehicle.length_m, vehicle.width_m);
+            table.bad(column, problem, "correct the file in which rows have the sizes of other vehicles, or leave out `width` and `height` here")
+        })
+    }
+}
+
+/// Fills the empty tracks, one per vehicle, and returns those with samples, ascending by id, and a note about vehicles of
+/// another size than in tracksMeta. If these are half of them, its rows are those of other vehicles.
 fn read_tracks(
     table: &mut CsvTable,
     columns: &TrackColumns,
@@ -89,25 +108,33 @@ fn read_tracks(
     vehicles: &[VehicleMeta],
     mut tracks: Vec<Track>,
     doubts: &mut Doubts,
-) -> Result<Vec<Track>> {
-    let check = SampleCheck::new(meta.frame_rate_hz);
+) -> Result<(Vec<Track>, Option<String>)> {
     // Sums of the accelerations over each vehicle's last second, because single samples are noisy.
     let mut sums_mps2 = vec![0.0; vehicles.len()];
-    let mut at = 0;
+    let (mut at, mut odd_sizes) = (0, 0);
+    let mut odd_size = None;
     while table.next_row()? {
         at = find_vehicle(table, columns.id, vehicles, at)?;
-        add_sample(table, columns, meta, &vehicles[at], &mut tracks[at], doubts)?;
-        let sample = check.sample(&tracks[at], &mut sums_mps2[at]);
-        if !is_plausible(&sample) {
-            report(&sample, table, columns, &tracks[at], doubts)?;
+        if tracks[at].is_empty()
+            && let Some(error) = columns.other_size(table, &vehicles[at])
+        {
+            odd_sizes += 1;
+            odd_size.get_or_insert(error);
         }
+        add_sample(table, columns, meta, &vehicles[at], &mut tracks[at], doubts)?;
+        check_sample(table, columns, &tracks[at], meta.frame_rate_hz, &mut sums_mps2[at], doubts)?;
     }
     check_counts(table, vehicles, &tracks)?;
     tracks.retain(|track| !track.is_empty());
     if tracks.is_empty() {
         return Err(meta::no_vehicle(table));
     }
-    Ok(tracks)
+    match odd_size {
+        Some(error) if 2 * odd_sizes > tracks.len() => Err(error),
+        odd_size => {
+            Ok((tracks, odd_size.map(|first| format!("{odd_sizes} vehicle(s) have two sizes, the first: {first}"))))
+        }
+    }
 }
 
 /// Is the tracks file large enough for all samples that the meta file claims? A damaged meta file can claim any
@@ -199,65 +226,31 @@ fn add_sample(
     Ok(())
 }
 
-/// Checks the last sample of a track against the plausible ranges.
-struct SampleCheck {
-    rate_hz: f64,
-    /// Samples per second.
-    window: usize,
-    /// One over that number.
-    inverse_window: f64,
-}
-
-/// The checked quantities of a sample: speed, lateral speed, difference of the lateral positions over the time between two
-/// samples, and mean acceleration over the last second.
-const CHECKED: [Quantity; 4] =
-    [Quantity::Speed, Quantity::LateralSpeed, Quantity::LateralSpeed, Quantity::Acceleration];
-
-impl SampleCheck {
-    fn new(rate_hz: f64) -> Self {
-        let window = (rate_hz.round() as usize).max(1);
-        SampleCheck { rate_hz, window, inverse_window: 1.0 / window as f64 }
-    }
-
-    /// The values of [`CHECKED`], 0 if not yet defined. `sum_mps2` is the sum of the track's accelerations over the last
-    /// second so far.
-    #[inline]
-    fn sample(&self, track: &Track, sum_mps2: &mut f64) -> [f64; 4] {
-        let last = |series: &[f64]| series.last().copied().unwrap_or_default();
-        *sum_mps2 += last(&track.a_s_mps2);
-        let samples = track.a_s_mps2.len();
-        if let Some(&left) = samples.checked_sub(self.window + 1).and_then(|at| track.a_s_mps2.get(at)) {
-            *sum_mps2 -= left;
-        }
-        let lateral_change_m = match track.d_m[..] {
-            [.., before, now] => now - before,
-            _ => 0.0,
-        };
-        let acceleration_mps2 = if samples >= self.window { *sum_mps2 * self.inverse_window } else { 0.0 };
-        [last(&track.v_s_mps), last(&track.v_d_mps), lateral_change_m * self.rate_hz, acceleration_mps2]
-    }
-}
-
-/// One test for all quantities: nearly every sample passes it.
-#[inline]
-fn is_plausible(sample: &[f64; 4]) -> bool {
-    CHECKED.iter().zip(sample).fold(true, |is_so, (quantity, value)| is_so & quantity.is_plausible(*value))
-}
-
-/// Counts the implausible values of a sample.
+/// Checks the last sample of a track: speed, lateral speed, lateral step over its time, and the mean acceleration over the last
+/// second, because single samples are noisy. `sum_mps2` is the sum of the accelerations over that second before the sample.
 ///
 /// # Errors
 /// A value outside the physical range, unless such values are accepted.
-#[cold]
-fn report(
-    sample: &[f64; 4],
+fn check_sample(
     table: &CsvTable,
     columns: &TrackColumns,
     track: &Track,
+    rate_hz: f64,
+    sum_mps2: &mut f64,
     doubts: &mut Doubts,
 ) -> Result<()> {
-    let columns = [columns.velocity_x, columns.velocity_y, columns.y, columns.acceleration_x];
-    for ((quantity, value), column) in CHECKED.into_iter().zip(*sample).zip(columns) {
+    let (window, last) = ((rate_hz.round() as usize).max(1), track.len() - 1);
+    *sum_mps2 += track.a_s_mps2[last] - last.checked_sub(window).map_or(0.0, |left| track.a_s_mps2[left]);
+    let mean_mps2 = if last + 1 >= window { *sum_mps2 / window as f64 } else { 0.0 };
+    let step_mps = last.checked_sub(1).map_or(0.0, |before| (track.d_m[last] - track.d_m[before]) * rate_hz);
+    let checked = [
+        (Quantity::Speed, track.v_s_mps[last], columns.velocity_x),
+        (Quantity::LateralSpeed, track.v_d_mps[last], columns.velocity_y),
+        (Quantity::LateralSpeed, step_mps, columns.y),
+        (Quantity::Acceleration, mean_mps2, columns.acceleration_x),
+    ];
+    // Nearly every value is plausible.
+    for (quantity, value, column) in checked.into_iter().filter(|(quantity, value, _)| !quantity.is_plausible(*value)) {
         let place = || table.field(column).of(format!("vehicle {}", track.id)).to_string();
         doubts.check(quantity, value, place).map_err(|problem| table.bad(column, problem, HELP.as_str()))?;
     }
@@ -318,6 +311,9 @@ fn notes(columns: &TrackColumns, vehicles: &[VehicleMeta]) -> Vec<String> {
     }
     notes
 }
+
+/// Sizes of one vehicle that differ by less are rounded, m.
+const SAME_SIZE_M: f64 = 0.1;
 
 /// Bytes of the shortest line: eight columns of one digit.
 const MIN_ROW_BYTES: u64 = 16;

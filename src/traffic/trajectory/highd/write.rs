@@ -10,6 +10,7 @@ use super::inventory::HighdFiles;
 use super::neighbours::{Around, NOBODY, neighbours};
 use super::writable::ImageLayout;
 use crate::trajectory::number::{push_hundredths, push_integer, rounded};
+use crate::trajectory::tracks::central;
 use crate::trajectory::{Recording, Track, VehicleClass};
 use lanesweep_support::atomic_file::{AtomicFile, StagedFile};
 use lanesweep_support::{Error, Result};
@@ -98,19 +99,27 @@ impl Writer<'_> {
         let mut all_minima = vec![Minima::default(); self.recording.tracks.len()];
         let mut line = CsvLine::default();
         for ((track, around), minima) in self.recording.tracks.iter().zip(&around).zip(&mut all_minima) {
-            for (sample, around) in around.iter().enumerate() {
+            let leftward_mps2 = central(&track.v_d_mps, self.recording.frame_rate_hz);
+            for (sample, (around, leftward_mps2)) in around.iter().zip(leftward_mps2).enumerate() {
                 let headways = self.headways(track, sample, around);
-                if around.preceding != NOBODY {
+                if around[0] != NOBODY {
                     lower(minima, &headways);
                 }
-                self.track_line(&mut line, track, sample, around, &headways);
+                self.track_line(&mut line, (track, sample), around, &headways, leftward_mps2);
                 line.end(&mut file)?;
             }
         }
         Ok((file.stage()?, all_minima))
     }
 
-    fn track_line(&self, line: &mut CsvLine, track: &Track, sample: usize, around: &Around, headways: &Headways) {
+    fn track_line(
+        &self,
+        line: &mut CsvLine,
+        (track, sample): (&Track, usize),
+        around: &Around,
+        headways: &Headways,
+        leftward_mps2: f64,
+    ) {
         let direction = self.direction(track);
         let (s_m, d_m) = (track.s_m[sample], track.d_m[sample]);
         line.integer(track.first_frame + sample as i64);
@@ -123,7 +132,7 @@ impl Writer<'_> {
         line.number(direction.forward(track.v_s_mps[sample]));
         line.number(direction.leftward(track.v_d_mps[sample]));
         line.number(direction.forward(track.a_s_mps2[sample]));
-        line.number(direction.leftward(self.leftward_acceleration(track, sample)));
+        line.number(direction.leftward(leftward_mps2));
         let (to_left, to_right) = (direction.forward(s_m) - self.extent_m.0, self.extent_m.1 - direction.forward(s_m));
         let (front, back) = match direction {
             Direction::Upper => (to_left, to_right),
@@ -135,28 +144,14 @@ impl Writer<'_> {
         line.number(headways.thw_s.unwrap_or(0.0));
         line.number(headways.ttc_s.unwrap_or(0.0));
         line.number(direction.forward(headways.preceding_v_s_mps));
-        let (left, right) = (around.left, around.right);
-        for index in [around.preceding, around.following]
-            .into_iter()
-            .chain([left.preceding, left.alongside, left.following])
-            .chain([right.preceding, right.alongside, right.following])
-        {
-            line.integer(self.recording.tracks.get(index as usize).map_or(0, |other| i64::from(other.id)));
+        for index in around {
+            line.integer(self.recording.tracks.get(*index as usize).map_or(0, |other| i64::from(other.id)));
         }
         line.integer(self.layout.lane_id(direction, track.lane[sample], d_m));
     }
 
-    /// Slope of the lateral speed between the neighbouring samples, m/s².
-    fn leftward_acceleration(&self, track: &Track, sample: usize) -> f64 {
-        let (from, to) = (sample.saturating_sub(1), (sample + 1).min(track.len() - 1));
-        if from == to {
-            return 0.0;
-        }
-        (track.v_d_mps[to] - track.v_d_mps[from]) * self.recording.frame_rate_hz / (to - from) as f64
-    }
-
     fn headways(&self, track: &Track, sample: usize, around: &Around) -> Headways {
-        let Some(ahead) = self.recording.tracks.get(around.preceding as usize) else { return Headways::default() };
+        let Some(ahead) = self.recording.tracks.get(around[0] as usize) else { return Headways::default() };
         let Some(ahead_sample) = ahead.index_of(track.first_frame + sample as i64) else { return Headways::default() };
         let (speed, ahead_speed) = (track.v_s_mps[sample], ahead.v_s_mps[ahead_sample]);
         let between_centres_m = ahead.s_m[ahead_sample] - track.s_m[sample];

@@ -5,14 +5,16 @@ use std::collections::HashSet;
 use super::preset::{Preset, Side};
 use super::road::{median, range};
 use super::understanding::{Understanding, median_of};
-use crate::trajectory::motion::{Impossible, JUMP_ACROSS_M, JUMP_ALONG_M, impossible, jumps};
+use crate::trajectory::motion::{JUMP_ACROSS_M, JUMP_ALONG_M, impossible, jumps};
 use crate::trajectory::overlap::overlaps;
-use crate::trajectory::{NO_LANE, Recording, Track, VehicleClass};
+use crate::trajectory::{Carriageway, NO_LANE, Recording, Track, VehicleClass};
 use lanesweep_model::plausibility::{Doubts, Implausible, NOISE_MPS, Quantity};
-use lanesweep_support::readable::{significant, value};
+use lanesweep_support::readable::{count, significant, value};
 
-/// Positions and speeds that differ by more than this fraction do not belong together; good data differ by less than 2 %.
+/// Positions and speeds that differ by more than this fraction do not belong together.
 const MAX_SPEED_DIFFERENCE: f64 = 0.05;
+/// Good data differ by less.
+const USUAL_DIFFERENCE: f64 = 0.02;
 /// Speeds that are later than positions by more than this are not theirs, s.
 const MAX_DELAY_S: f64 = 0.2;
 /// A speed that positions tell to vary by more is not constant, m/s.
@@ -22,41 +24,61 @@ const MAX_OVERLAPPING: f64 = 0.1;
 /// Fraction of vehicles that cross the road by more than the distance (m) from which on it is no motorway.
 const MAX_ACROSS: f64 = 0.15;
 const ACROSS_M: f64 = 15.0;
+/// Vehicles that are farther apart than this, and than anyone drives, may be in two places, m.
+const MIN_APART_M: f64 = 100.0;
 /// What goes farther back along the road drives backwards, m.
 const MAX_BACKWARD_M: f64 = 5.0;
 /// Offsets from the middle of the lane of so many half widths are those of an edge, which gives 1.
 const MIN_EDGE: f64 = 0.6;
+/// Distance of a lane line from the middle between the vehicles of its lanes from which on it is not where they see it, m.
+const MAX_LINE_OFF_M: f64 = 0.45;
+/// So many samples have the extreme acceleration, and their speeds change by so much more (m/s²), where it was clipped.
+const MIN_CLIPPED: usize = 20;
+const MIN_BEYOND_MPS2: f64 = 0.2;
+/// A raster of positions that is larger, and a larger fraction of the step from sample to sample, is coarse, m.
+const MIN_RASTER_M: f64 = 0.2;
+const MAX_RASTER: f64 = 0.25;
 /// Fewer vehicles prove nothing.
 const MIN_VEHICLES: usize = 5;
 
 /// Distance over integrated speed that a wrong unit gives, and what it means.
-const MISTAKEN: [(f64, &str); 8] = [
+const MISTAKEN: [(f64, &str); 6] = [
     (1.0 / 3.6, "the speeds look like km/h: add `unit = \"km/h\"`"),
     (3.280_84, "the positions look like feet: add `unit = \"ft\"`"),
     (0.3048, "the speeds look like ft/s: add `unit = \"ft/s\"`"),
     (0.447_04, "the speeds look like mph: add `unit = \"mph\"`"),
     (1.466_67, "the positions look like feet and the speeds like mph"),
-    (25.0 / 30.0, "the frame rate looks like 30 instead of 25"),
-    (1.2, "the frame rate looks like 25 instead of 30"),
     (0.01, "the positions look like metres, not centimetres"),
 ];
 
 impl Understanding {
     /// Tells the shape of the road, and finds tracks that do not follow one.
     pub(super) fn check_road(&mut self, recording: &Recording) {
-        let mut ends = vec![(f64::INFINITY, f64::NEG_INFINITY); recording.carriageways.len()];
-        let (mut ranges, mut across) = (Vec::new(), 0);
+        let (mut ranges, mut along, mut across) = (Vec::new(), Vec::new(), 0);
         for track in &recording.tracks {
             let (left, right) = range(track.d_m.iter().copied());
-            let along = range(track.s_m.iter().copied());
+            along.push((track.carriageway, range(track.s_m.iter().copied())));
             if (track.s_m[track.len() - 1] - track.s_m[0]).abs() >= 30.0 || right - left > ACROSS_M {
                 ranges.push(right - left);
                 across += usize::from(right - left > ACROSS_M);
             }
-            let of = &mut ends[track.carriageway];
-            *of = (of.0.min(along.0), of.1.max(along.1));
         }
-        let length_m = ends.iter().map(|(low, high)| high - low).fold(0.0, f64::max);
+        along.sort_by(|(a, (from, _)), (b, (of, _))| a.cmp(b).then(from.total_cmp(of)));
+        let longest_m = along.iter().map(|(_, (low, high))| high - low).fold(MIN_APART_M, f64::max);
+        let mut length_m = 0.0_f64;
+        for of in along.chunk_by(|a, b| a.0 == b.0) {
+            let mut reached_m = of[0].1.1;
+            for (before, (_, (low_m, high_m))) in of.iter().enumerate() {
+                if low_m - reached_m > longest_m && before.min(of.len() - before) >= MIN_VEHICLES {
+                    let [from, to] = [reached_m, *low_m].map(|end_m| significant(end_m, 4));
+                    self.warn(format!(
+                        "no vehicle drives between {from} and {to} m along the road: if these are two places, give each its own file, or name it in a column `recording`"
+                    ));
+                }
+                reached_m = reached_m.max(*high_m);
+            }
+            length_m = length_m.max(reached_m - of[0].1.0);
+        }
         let across = across as f64 / ranges.len().max(1) as f64;
         let shape = if self.seen.is_curved { "curved" } else { "straight" };
         let (length, wander) = (significant(length_m, 4), significant(median(&mut ranges), 2));
@@ -72,21 +94,29 @@ impl Understanding {
     /// Compares speeds with positions, and accelerations with speeds.
     pub(super) fn check_speeds(&mut self, recording: &Recording) {
         let seen = &mut self.seen;
+        let mut is_off = false;
         if !seen.ratios.is_empty() && seen.ratios.len() >= MIN_VEHICLES.min(recording.tracks.len()) {
-            let ratio = median(&mut seen.ratios);
+            let (ratio, error) = median_and_error(&mut seen.ratios);
             seen.has_wrong_ratio = (ratio - 1.0).abs() > MAX_SPEED_DIFFERENCE;
+            is_off = seen.has_wrong_ratio || (ratio - 1.0).abs() > USUAL_DIFFERENCE + 4.0 * error;
+            let near = |(factor, _): &&(f64, &str)| (ratio / factor - 1.0).abs() < 0.06;
             // A rate that the times give is right.
-            let is_possible = |why: &str| !(seen.rate_is_of_times && why.starts_with("the frame rate"));
-            let near = |(factor, why): &&(f64, &str)| (ratio / factor - 1.0).abs() < 0.06 && is_possible(why);
-            let why = MISTAKEN.iter().find(near).map_or("check units and frame rate", |(_, why)| why);
-            let times = significant(ratio, 3);
-            self.fact("distance", format!("{times} times as far as the speeds tell (median)"));
-            if self.seen.has_wrong_ratio {
-                self.refuse(format!("vehicles move {times} times as far as their speeds tell: {why}"));
+            let by_rate = match seen.rate_is_of_times {
+                true => String::new(),
+                false => format!(" and frame rate: {} Hz would fit", significant(recording.frame_rate_hz / ratio, 3)),
+            };
+            let named = MISTAKEN.iter().find(near).map(|(_, why)| (*why).to_owned());
+            let why = named.unwrap_or_else(|| format!("check units{by_rate}"));
+            let (times, error) = (significant(ratio, 4), significant(error, 1));
+            self.fact("distance", format!("{times} times as far as the speeds tell (median, ± {error})"));
+            if is_off {
+                let text = format!("vehicles move {times} ± {error} times as far as their speeds tell: {why}");
+                self.find(self.seen.has_wrong_ratio, text);
             }
         }
         let (delay, told) = (self.seen.delay, self.seen.acceleration);
-        if delay.of_derived > 0.01 * delay.count && delay.slope().abs() > MAX_DELAY_S.max(4.0 * delay.slope_error()) {
+        let is_late = delay.slope().abs() > MAX_DELAY_S.max(4.0 * delay.slope_error());
+        if is_late && !is_off && delay.of_derived > 0.01 * delay.count {
             let by_s = significant(delay.slope(), 2);
             self.warn(format!("speeds are {by_s} s late against positions: rows are shifted, or filters delay them"));
         }
@@ -113,6 +143,14 @@ impl Understanding {
 
     /// Finds values that are implausible or impossible: half of the vehicles with one is a unit, not an odd vehicle.
     pub(super) fn check_units(&mut self, recording: &Recording) {
+        let [length_m, width_m] = [median_of(recording, |of| of.length_m), median_of(recording, |of| of.width_m)]
+            .map(|of| significant(of, 3));
+        if 2 * recording.tracks.iter().filter(|of| of.width_m > of.length_m).count() > recording.tracks.len() {
+            self.refuse(format!(
+                "vehicles are {length_m} m long and {width_m} m wide (medians): the columns for length and width are swapped"
+            ));
+            return;
+        }
         // Refused: what is beyond the physical range is grave.
         let mut doubts = Doubts::new(Implausible::Refused);
         let mut grave = None;
@@ -190,10 +228,33 @@ impl Understanding {
                 "the speed of a vehicle does not change, although {contradicted} move at speeds that differ by more than \
                  {MAX_RANGE_MPS} m/s: it is one speed per vehicle; leave out the column, so that speeds follow from positions"
             ));
-        } else if let Some(Impossible { vehicles, first: (vehicle, frame), problem, .. }) = impossible(recording) {
+        } else if let Some((vehicles, first)) = impossible(recording) {
             self.refuse(format!(
-                "{vehicles} vehicle(s) have samples that cannot be, the first is vehicle {vehicle} at frame {frame}: {problem}; correct them, name the text that stands for no value in `none`, leave out the column, or smooth the positions (`smoothing_s`)"
+                "{vehicles} vehicle(s) have samples that cannot be, the first is {first}; correct them, name the text that stands for no value in `none`, leave out the column, or smooth the positions (`smoothing_s`)"
             ));
+        }
+    }
+
+    /// Finds accelerations that end at a value beyond which the speeds beside them change, and coarse positions.
+    pub(super) fn check_resolution(&mut self, recording: &Recording) {
+        let rate_hz = recording.frame_rate_hz;
+        let inner = || recording.tracks.iter().flat_map(|of| (1..of.len().max(2) - 1).map(move |k| (of, k)));
+        for sign in [1.0, -1.0] {
+            let extreme = inner().map(|(of, k)| sign * of.a_s_mps2[k]).fold(0.0, f64::max);
+            let at = inner().filter(|(of, k)| sign * of.a_s_mps2[*k] == extreme);
+            let told: Vec<f64> =
+                at.map(|(of, k)| sign * (of.v_s_mps[k + 1] - of.v_s_mps[k - 1]) * rate_hz / 2.0).collect();
+            let told_mps2 = told.iter().sum::<f64>() / told.len() as f64;
+            if told.len() >= MIN_CLIPPED && told_mps2 > extreme + MIN_BEYOND_MPS2 {
+                let (side, number) = (if sign > 0.0 { "above" } else { "below" }, count(told.len() as u64));
+                let [extreme, told] = [extreme, told_mps2].map(|value| significant(sign * value, 2));
+                self.warn(format!("no acceleration is {side} {extreme} m/s², which {number} samples have, although their speeds change by {told} m/s² on average: they were clipped; without the column they follow from speeds"));
+            }
+        }
+        let coarse: Vec<f64> = recording.tracks.iter().filter_map(coarse_raster_m).collect();
+        if 2 * coarse.len() > recording.tracks.len() {
+            let raster = significant(median(&mut { coarse }), 3);
+            self.warn(format!("positions along the road are multiples of {raster} m, which is coarse for {} samples per second: gaps, and speeds from positions, are as coarse", value(rate_hz)));
         }
     }
 
@@ -276,19 +337,27 @@ impl Understanding {
 
     /// Finds boxes that overlap or are beside the middle of their lanes, and small jumps.
     pub(super) fn check_boxes(&mut self, recording: &Recording) {
-        if let Some(found) = overlaps(recording) {
-            let involved: HashSet<usize> = found.pairs.iter().flat_map(|(a, b)| [*a, *b]).collect();
-            let fraction = involved.len() as f64 / recording.tracks.len() as f64;
-            let (pairs, first) = (found.pairs.len(), &found.first);
-            self.find(fraction > MAX_OVERLAPPING && involved.len() >= MIN_VEHICLES, format!(
-                "{pairs} pair(s) of vehicles overlap, the first are {first}: check sizes and `reference` (centre, front, rear, corner)"
-            ));
+        let found = overlaps(recording);
+        let involved: HashSet<usize> = found.pairs.iter().flat_map(|(a, b)| [*a, *b]).collect();
+        let is_grave = involved.len() as f64 > MAX_OVERLAPPING * recording.tracks.len() as f64;
+        let what = format!(
+            "pair(s) of vehicles overlap, the first are {}: check sizes and `reference` (centre, front, rear, corner)",
+            found.first
+        );
+        self.find_of(found.pairs.len() as u64, is_grave && involved.len() >= MIN_VEHICLES, &what);
+        if let Some((a, b)) = found.coupled.first().map(|(a, b)| (recording.tracks[*a].id, recording.tracks[*b].id)) {
+            let what = format!(
+                "pair(s) of vehicles drive less than 1 m apart at one distance for 5 s and longer, the first are vehicles {a} and {b}: join them if they are tractor and trailer, else one leads the other"
+            );
+            self.warn_of(found.coupled.len() as u64, &what);
         }
-        let (mut by_lane, mut by_class, mut shifts) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut by_lane, mut by_class) = (Vec::new(), Vec::new());
         for (at, of) in recording.carriageways.iter().enumerate() {
             let mut offsets = self.offsets(recording, at);
-            let sign = if of.name == "2" { 1.0 } else { -1.0 };
-            shifts.extend(offsets.iter().map(|(half_m, mean_m, _)| sign * mean_m / half_m));
+            // Lines that follow from positions are amid them, whatever the point.
+            if self.seen.lane_sources.is_empty() {
+                self.check_lines(of, &offsets);
+            }
             by_class.extend(slope_within(&mut offsets, 0.02));
             offsets.iter_mut().for_each(|of| of.2 /= 2);
             by_lane.extend(slope_within(&mut offsets, 0.08));
@@ -303,17 +372,40 @@ impl Understanding {
                 "the wider a vehicle, the farther it is beside the middle of its lane: by {slope} ± {error} m for each metre of half its width, where an edge or a corner of the box gives 1, see `reference`"
             ));
         }
-        // Lines that follow from positions are amid them, whatever the point.
-        let shift = median(&mut shifts).abs();
-        if self.seen.lane_sources.is_empty() && shift >= MIN_EDGE && shifts.len() >= MIN_VEHICLES {
-            let shift = significant(shift, 2);
-            self.refuse(format!(
-                "half of the vehicles are at least {shift} half widths beside the middle of their lanes, on one side of the road, so that boxes cross lane lines: y is that of another point of the box"
-            ));
-        }
         let jumping = recording.tracks.iter().filter(|track| jumps(track, recording.frame_rate_hz)).count();
         let what = format!("tracks jump by more than {JUMP_ALONG_M} m along or {JUMP_ACROSS_M} m across the road");
         self.warn_of(jumping as u64, &what);
+    }
+
+    /// Finds lane lines of the file that are not where vehicles see them, by the offsets of those that keep their lanes.
+    fn check_lines(&mut self, lanes: &Carriageway, offsets: &[(f64, f64, u16)]) {
+        let way = way(lanes);
+        let shift = median(&mut offsets.iter().map(|(half_m, mean_m, _)| mean_m / half_m).collect::<Vec<f64>>());
+        if shift.abs() >= MIN_EDGE && offsets.len() >= MIN_VEHICLES {
+            let (shift, side) = (significant(shift.abs(), 2), if shift > 0.0 { "left" } else { "right" });
+            self.refuse(format!(
+                "{way}: half of the vehicles are at least {shift} half widths to the {side} of the middle of their lanes, so that boxes cross lane lines: y is that of another point of the box, or the lane lines are shifted"
+            ));
+            return;
+        }
+        // Where the vehicles of a lane are on average.
+        let middle = |lane: usize| {
+            let of = offsets.iter().filter(|of| usize::from(of.2 / 2) == lane).map(|of| of.1);
+            let (mean_m, error_m) = mean_and_error(of)?;
+            Some((lanes.lane(lane)?.centre_m() + mean_m, error_m))
+        };
+        for line in 1..lanes.lane_count() {
+            let Some(((left_m, a), (right_m, b))) = middle(line - 1).zip(middle(line)) else { continue };
+            let (line_m, error_m) = (lanes.lane_lines_m[line], 0.5 * libm::hypot(a, b));
+            let off_m = line_m - 0.5 * (left_m + right_m);
+            if off_m.abs() > MAX_LINE_OFF_M + 4.0 * error_m {
+                let y_m = if lanes.name == "2" { -line_m } else { line_m };
+                self.warn(format!(
+                    "{way}: the lane marking at y = {y_m:.2} m is {:.2} ± {error_m:.2} m from the middle between the vehicles of its lanes: check the lane markings, which decide when a lane change begins",
+                    off_m.abs()
+                ));
+            }
+        }
     }
 
     /// Half the width of each vehicle that keeps its lane, its mean offset to the left of the lane's middle, m, and its lane and
@@ -329,11 +421,8 @@ impl Understanding {
         };
         let all: Vec<(f64, f64, u16)> = recording.tracks.iter().filter_map(offset).collect();
         let mean = |(is_truck, class): (u16, &str)| {
-            let of: Vec<f64> = all.iter().filter(|of| of.2 % 2 == is_truck).map(|of| of.1).collect();
-            let n = of.len() as f64;
-            let mean_m = of.iter().sum::<f64>() / n;
-            let error_m = libm::sqrt(of.iter().map(|m| (m - mean_m) * (m - mean_m)).sum::<f64>() / (n * (n - 1.0)));
-            (of.len() >= MIN_VEHICLES).then(|| format!("{class} {mean_m:.2} ± {error_m:.2} m"))
+            let (mean_m, error_m) = mean_and_error(all.iter().filter(|of| of.2 % 2 == is_truck).map(|of| of.1))?;
+            Some(format!("{class} {mean_m:.2} ± {error_m:.2} m"))
         };
         let means: Vec<String> = [(0, "cars"), (1, "lorries")].into_iter().filter_map(mean).collect();
         // Lines that follow from positions lie amid cars and lorries; the difference holds whatever the lines are.
@@ -342,7 +431,7 @@ impl Understanding {
             format!("; lorries {by_m:.2} ± {error_m:.2} m to the left of the cars of their lane")
         });
         if !means.is_empty() {
-            let (way, means) = (if lanes.name == "2" { "forward" } else { "backward" }, means.join(", "));
+            let (way, means) = (way(lanes), means.join(", "));
             self.fact("offsets", format!("{way}: {means} to the left of the middle of their lanes{beside}"));
         }
         all
@@ -373,12 +462,43 @@ impl Understanding {
     }
 }
 
+/// The raster that all steps of a track along the road are multiples of, m; `None` if it is fine against the usual step, or
+/// nothing tells it because all steps are equal.
+fn coarse_raster_m(track: &Track) -> Option<f64> {
+    let mut steps_m: Vec<f64> = track.s_m.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
+    let (_, high_m) = range(steps_m.iter().copied());
+    let raster_m = steps_m.iter().copied().filter(|step_m| *step_m > 1e-6).fold(f64::INFINITY, f64::min);
+    let is_on = |step_m: &f64| (step_m / raster_m - (step_m / raster_m).round()).abs() < 1e-6;
+    let is_coarse = raster_m > MIN_RASTER_M && raster_m > MAX_RASTER * median(&mut steps_m);
+    (is_coarse && high_m > 1.5 * raster_m && steps_m.iter().all(is_on)).then_some(raster_m)
+}
+
+/// The median and its standard error, from the quartiles.
+fn median_and_error(values: &mut [f64]) -> (f64, f64) {
+    values.sort_by(f64::total_cmp);
+    let quarter = |part: usize| values[part * (values.len() - 1) / 4];
+    (median(&mut values.to_vec()), 0.93 * (quarter(3) - quarter(1)) / (values.len() as f64).sqrt())
+}
+
 /// By how much the mean speeds over a second differ along a track, by its positions, m/s.
 fn speed_range_mps(track: &Track, rate_hz: f64) -> f64 {
     let second = rate_hz.round().max(1.0) as usize;
     let speeds = (second..track.len()).map(|k| (track.s_m[k] - track.s_m[k - second]) * rate_hz / second as f64);
     let (low, high) = range(speeds);
     high - low
+}
+
+/// The mean of vehicles' values and its standard error; `None` for few.
+fn mean_and_error(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let values: Vec<f64> = values.collect();
+    let (n, mean) = (values.len() as f64, values.iter().sum::<f64>() / values.len() as f64);
+    let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
+    (values.len() >= MIN_VEHICLES).then(|| (mean, (squares / (n * (n - 1.0))).sqrt()))
+}
+
+/// The direction of a carriageway in words.
+pub(super) fn way(of: &Carriageway) -> &'static str {
+    if of.name == "2" { "forward" } else { "backward" }
 }
 
 /// Slope of the second value over the first within groups, so that the middles of lanes do not matter, and its standard error;

@@ -29,7 +29,8 @@ pub use preset::{Axes, Classes, HIGHD, HeadingOrigin, LaneBands, MetaFile, Prese
 pub use roles::{ColumnName, Role};
 pub use understanding::{Finding, Understanding};
 
-pub(super) use road::median;
+pub(super) use road::{median, range};
+pub(super) use smooth::central;
 
 use raw::RawRecording;
 use rows::{Columns, Rows};

@@ -237,7 +237,7 @@ impl Preset {
             ("frame_rate_hz", self.frame_rate_hz, [0.1, 1e4]),
             ("resample_hz", self.resample_hz, [0.1, 1e4]),
             ("max_gap_s", Some(self.max_gap_s), [0.0, 60.0]),
-            ("smoothing_s", self.smoothing_s, [0.0, 60.0]),
+            ("smoothing_s", self.smoothing_s, [0.0, 5.0]),
             ("lanes.width_m", self.lanes.width_m, [0.5, 50.0]),
         ];
         for (key, value, [min, max]) in numbers {

@@ -19,6 +19,8 @@ use lanesweep_support::{Error, Place, Result};
 
 /// Maximum number of names of lanes, and of classes, of a recording; more are none.
 const MAX_NAMES: usize = 65_536;
+/// Maximum number of lines that Excel and Calc hold; they cut longer files.
+const SPREADSHEET_LINES: u64 = 1_048_576;
 /// Times of day that fall by more begin again at midnight, s.
 const HALF_A_DAY_S: f64 = 43_200.0;
 
@@ -113,8 +115,17 @@ pub(super) fn read_table(file: &TrackFile, preset: &Preset) -> Result<(Vec<RawRe
     let has_frames = columns.has(Role::Frame)
         && (preset.frame_rate_hz.is_some() || preset.recording.is_some() || !columns.has(Role::Time));
     let mut collecting = Collecting { axes: preset.axes, id: file.id.clone(), has_frames, ..Collecting::default() };
-    let checksum = rows.each(&columns, |row| collecting.add(row))?;
+    let mut lines = 1;
+    let checksum = rows.each(&columns, |row| {
+        lines += 1;
+        collecting.add(row)
+    })?;
     let mut recordings = collecting.recordings;
+    if let Some(last) = recordings.last_mut().filter(|_| lines == SPREADSHEET_LINES) {
+        last.notes.push(format!(
+            "the file has {lines} lines, as many as a spreadsheet can hold: rows may be missing at its end; export it without one"
+        ));
+    }
     recordings.retain(|recording| !recording.vehicles.is_empty());
     if let Some(found) = columns.found_time() {
         roles.iter_mut().filter(|(role, _)| *role == Role::Time).for_each(|(_, name)| *name += &format!(" ({found})"));

@@ -73,7 +73,7 @@ pub(in crate::trajectory) fn median(values: &mut [f64]) -> f64 {
 }
 
 /// The smallest and the largest value.
-pub(super) fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
+pub(in crate::trajectory) fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     values.into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
 }
 

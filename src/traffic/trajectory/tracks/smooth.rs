@@ -5,7 +5,7 @@
 use nalgebra::{Matrix4, Vector4};
 
 /// Central differences, one-sided at the ends, per second.
-pub(super) fn central(values: &[f64], rate_hz: f64) -> Vec<f64> {
+pub(in crate::trajectory) fn central(values: &[f64], rate_hz: f64) -> Vec<f64> {
     let last = values.len() - 1;
     let at = |k: usize| {
         let (from, to) = (k.saturating_sub(1), (k + 1).min(last));

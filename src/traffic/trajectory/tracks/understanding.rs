@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::LoadedTracks;
+use super::findings::way;
 use super::preset::Preset;
 use super::road::median;
 use crate::trajectory::{Loaded, Noise, Recording, Track, VehicleClass};
@@ -198,17 +199,17 @@ impl Understanding {
         self.check_units(recording);
         self.leave_out_backwards(recording);
         self.check_motion(recording);
+        self.check_resolution(recording);
         self.check_axes(recording, preset);
         self.check_boxes(recording);
         self.clear_noise(recording);
         for (index, of) in recording.carriageways.iter().enumerate() {
             let widths = of.lane_lines_m.windows(2).map(|two| significant(two[0] - two[1], 3));
             let widths = widths.collect::<Vec<_>>().join(" ");
-            let way = if of.name == "2" { "forward" } else { "backward" };
             let source = self.seen.lane_sources.get(index).copied().unwrap_or("the lane lines in the file");
             let (lanes, tracks) =
                 (of.lane_count(), recording.tracks.iter().filter(|of| of.carriageway == index).count());
-            self.fact("lanes", format!("{way}: {lanes} lanes of {widths} m from {source}; {tracks} tracks"));
+            self.fact("lanes", format!("{}: {lanes} lanes of {widths} m from {source}; {tracks} tracks", way(of)));
         }
         let of_class = |class: VehicleClass, name: &str| {
             let of = recording.tracks.iter().filter(|track| track.class == class);

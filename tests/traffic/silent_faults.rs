@@ -1,0 +1,258 @@
+//! Faulty recordings of which every number is plausible: what was wrong with them is said, and nothing is said of good ones.
+
+use std::path::Path;
+
+use lanesweep::model::plausibility::Implausible;
+use lanesweep::traffic::Source;
+use lanesweep::traffic::mining::{Collection, MiningOptions};
+use lanesweep::traffic::trajectory::highd;
+use lanesweep::traffic::trajectory::tracks::Understanding;
+use lanesweep::traffic::trajectory::{InputFile, Recording, Track, VehicleClass};
+
+use crate::common::exid::Plain;
+use crate::common::small::Texts;
+use crate::traffic::tracks::{generated, says, understood};
+
+/// What is understood of a recording in highD's format.
+fn highd_understood(recording: &Recording) -> Understanding {
+    let (dir, mut recording) = (tempfile::tempdir().unwrap(), recording.clone());
+    highd::quantize(&mut recording).unwrap();
+    highd::write(dir.path(), &recording).unwrap();
+    let files = highd::HighdFiles::named(dir.path(), &recording.id);
+    InputFile::Highd(files).understand(Implausible::Accepted).unwrap().remove(0).understanding
+}
+
+/// A recording with a change.
+fn with(change: impl Fn(&mut Recording)) -> Recording {
+    let mut recording = generated();
+    change(&mut recording);
+    recording
+}
+
+fn each_track(change: impl Fn(&mut Track)) -> Recording {
+    with(|recording| recording.tracks.iter_mut().for_each(&change))
+}
+
+/// What good recordings must not be told.
+const WORDS: [&str; 8] = [
+    "half widths",
+    "lane marking at y",
+    "times as far as their speeds",
+    "were clipped",
+    "are multiples of",
+    "no vehicle drives between",
+    "less than 1 m apart",
+    "are swapped",
+];
+
+#[test]
+fn good_recordings_are_told_none_of_it() {
+    let recording = generated();
+    let all = [highd_understood(&recording), understood(&Plain::of(&recording, 5), &|_| ()).unwrap()];
+    for about in all {
+        assert!(WORDS.iter().all(|words| !says(&about, words)), "{:?}", about.findings);
+    }
+}
+
+#[test]
+fn boxes_and_lane_markings_beside_the_lanes_are_found_in_each_direction() {
+    // The corner of the box in place of its middle, in one direction.
+    let about = highd_understood(&each_track(|track| {
+        let half_m = if track.carriageway == 0 { track.width_m / 2.0 } else { 0.0 };
+        track.d_m.iter_mut().for_each(|d_m| *d_m -= half_m);
+    }));
+    assert!(!about.is_usable() && says(&about, "half widths to the right"), "{:?}", about.findings);
+    assert!(!says(&about, "forward: half"), "{:?}", about.findings);
+    // All lane markings lie too low in the image.
+    let shifted = |by_m: f64| {
+        highd_understood(&with(|recording| {
+            for of in &mut recording.carriageways {
+                let sign = if of.name == "2" { -1.0 } else { 1.0 };
+                of.lane_lines_m.iter_mut().for_each(|line_m| *line_m += sign * by_m);
+            }
+        }))
+    };
+    for way in ["forward", "backward"] {
+        let is_told = |about: &Understanding| {
+            [": half of the vehicles", ": the lane marking"].iter().any(|words| says(about, &format!("{way}{words}")))
+        };
+        assert!(is_told(&shifted(0.63)) && !is_told(&shifted(0.2)), "{:?}", shifted(0.63).findings);
+    }
+    // One marking is mistyped.
+    for by_m in [0.6_f64, -1.0] {
+        let recording = with(|recording| recording.carriageways[0].lane_lines_m[1] += by_m);
+        let about = highd_understood(&recording);
+        let told = format!("backward: the lane marking at y = {:.2} m is ", recording.carriageways[0].lane_lines_m[1]);
+        let lines: Vec<&str> = about.findings.iter().filter_map(|finding| finding.text.strip_prefix(&told)).collect();
+        let [off] = lines[..] else { panic!("{told}: {:?}", about.findings) };
+        let off_m: f64 = off.split(' ').next().unwrap().parse().unwrap();
+        assert!(about.is_usable() && (off_m - by_m.abs()).abs() < 0.05, "{off}");
+    }
+}
+
+#[test]
+fn a_frame_rate_that_is_a_little_wrong_is_told_with_the_one_that_fits() {
+    for (rate_hz, told) in [(25.9, "1.036 ± 0.0"), (24.0, "0.96 ± 0.0")] {
+        let about = highd_understood(&with(|recording| recording.frame_rate_hz = rate_hz));
+        let told = told.split(' ').next().unwrap();
+        assert!(about.is_usable() && says(&about, &format!("vehicles move {told}")), "{:?}", about.findings);
+        assert!(says(&about, "frame rate: 25.0 Hz would fit") && !says(&about, "s late"), "{:?}", about.findings);
+    }
+}
+
+#[test]
+fn clipped_accelerations_and_coarse_positions_are_told() {
+    for (low, high, told) in
+        [(-2.0, 2.0, "no acceleration is below -2.0"), (-9.0, 0.5, "no acceleration is above 0.50")]
+    {
+        let about =
+            highd_understood(&each_track(|track| track.a_s_mps2.iter_mut().for_each(|a| *a = a.clamp(low, high))));
+        assert!(says(&about, told) && says(&about, "clipped"), "{told}: {:?}", about.findings);
+    }
+    for (raster_m, is_coarse) in [(1.0, true), (0.1, false)] {
+        let mut table = Plain::of(&generated(), 1);
+        table.map("x", |x, _| (x / raster_m).round() * raster_m);
+        let about = understood(&table, &|_| ()).unwrap();
+        assert_eq!(says(&about, "are multiples of 1.00 m"), is_coarse, "{raster_m}: {:?}", about.findings);
+    }
+}
+
+#[test]
+fn two_places_in_one_table_are_told_or_parted() {
+    let (mut table, there) = (Plain::of(&generated(), 5), Plain::of(&generated(), 5));
+    table.header.push("site".to_owned());
+    table.rows.iter_mut().for_each(|row| row.push("north".to_owned()));
+    for mut row in there.rows {
+        row[0] = format!("{}", 100_000 + row[0].parse::<u32>().unwrap());
+        row[2] = format!("{:.4}", 2000.0 + row[2].parse::<f64>().unwrap());
+        row.push("south".to_owned());
+        table.rows.push(row);
+    }
+    let about = understood(&table, &|_| ()).unwrap();
+    assert!(about.recording == "own-north" && !says(&about, "no vehicle drives between"), "{:?}", about.findings);
+    let about = understood(&table.without(&["site"]), &|_| ()).unwrap();
+    assert!(says(&about, "no vehicle drives between"), "{:?}", about.findings);
+}
+
+#[test]
+fn a_table_as_long_as_a_spreadsheet_may_be_cut() {
+    let text = |lines: usize| {
+        let mut text = "id,t,x,y\n".to_owned();
+        (1..lines).for_each(|row| text += &format!("{},{},{},0\n", row % 10, row / 10, 10 * (row % 10) + row / 10));
+        Plain::of_text(&text)
+    };
+    for (lines, is_told) in [(1_048_576, true), (1_048_575, false)] {
+        let about = understood(&text(lines), &|_| ()).unwrap();
+        assert_eq!(says(&about, "1048576 lines, as many as a spreadsheet can hold"), is_told);
+    }
+}
+
+#[test]
+fn a_tractor_and_its_trailer_as_two_objects_are_told() {
+    let recording = with(|recording| {
+        let (at, _) = recording
+            .tracks
+            .iter()
+            .enumerate()
+            .filter(|(_, of)| of.class == VehicleClass::Truck && of.length_m > 10.0)
+            .max_by_key(|(_, of)| of.len())
+            .unwrap();
+        let whole = recording.tracks[at].clone();
+        let tractor_m = 6.0;
+        let trailer_m = whole.length_m - tractor_m;
+        let part = |id: u32, length_m: f64, ahead_m: f64| {
+            let s_m = whole.s_m.iter().map(|s_m| s_m + ahead_m).collect();
+            Track { id, length_m, s_m, ..whole.clone() }
+        };
+        let last = recording.tracks.last().unwrap().id;
+        recording.tracks[at] = part(whole.id, tractor_m, trailer_m / 2.0);
+        recording.tracks.push(part(last + 1, trailer_m, -tractor_m / 2.0));
+    });
+    let about = highd_understood(&recording);
+    assert!(
+        about.is_usable() && says(&about, "1 pair(s) of vehicles drive less than 1 m apart"),
+        "{:?}",
+        about.findings
+    );
+}
+
+#[test]
+fn sizes_of_other_vehicles_are_refused_with_both_files_named() {
+    let texts = Texts::of(&generated());
+    let meta = Plain::of_text(&texts.tracks_meta);
+    let with_sizes_of = |from: &dyn Fn(usize) -> usize| {
+        let mut shifted = meta.clone();
+        let rows = meta.rows.len();
+        (0..rows).for_each(|row| shifted.rows[row][1..3].clone_from_slice(&meta.rows[from(row) % rows][1..3]));
+        Texts { tracks_meta: shifted.text(), ..texts.clone() }.read_checked(Implausible::Refused)
+    };
+    let error = with_sizes_of(&|row| row + 1).unwrap_err().to_string();
+    assert!(["01_tracks.csv", "line 2", "in the tracksMeta file"].iter().all(|words| error.contains(words)), "{error}");
+    let odd = (0..meta.rows.len() - 1).find(|row| meta.rows[*row][1] != meta.rows[row + 1][1]).unwrap();
+    let notes = with_sizes_of(&|row| if row == odd { row + 1 } else { row }).unwrap().notes;
+    assert!(notes.iter().any(|note| note.starts_with("1 vehicle(s) have two sizes")), "{notes:?}");
+    assert_eq!(with_sizes_of(&|row| row).unwrap().notes, [""; 0]);
+    // Lengths and widths in each other's columns.
+    let about = highd_understood(&each_track(|track| {
+        (track.length_m, track.width_m) = (track.width_m, track.length_m.min(9.9));
+    }));
+    let first = about.findings.iter().find(|finding| finding.is_grave).unwrap();
+    assert!(first.text.contains("are swapped"), "{:?}", about.findings);
+}
+
+fn load(folder: &Path) -> Collection {
+    let source = Source::Recordings { path: folder.to_owned(), preset: None };
+    source.load(&MiningOptions::default(), Implausible::Refused, || Ok(())).unwrap()
+}
+
+/// The frames of a recording in an interval, with other numbers of vehicles and frames.
+fn clip(recording: &Recording, id: &str, [from, to]: [i64; 2]) -> Recording {
+    let part = |track: &Track| {
+        let [first, end] = [from, to].map(|frame| (frame - track.first_frame).clamp(0, track.len() as i64) as usize);
+        let cut = |series: &[f64]| series[first..end].to_vec();
+        (end > first).then(|| Track {
+            id: track.id + 500,
+            first_frame: track.first_frame + first as i64 - from + 1,
+            s_m: cut(&track.s_m),
+            d_m: cut(&track.d_m),
+            v_s_mps: cut(&track.v_s_mps),
+            v_d_mps: cut(&track.v_d_mps),
+            a_s_mps2: cut(&track.a_s_mps2),
+            lane: track.lane[first..end].to_vec(),
+            ..track.clone()
+        })
+    };
+    Recording { id: id.to_owned(), tracks: recording.tracks.iter().filter_map(part).collect(), ..recording.clone() }
+}
+
+#[test]
+fn a_part_of_a_recording_under_other_numbers_counts_once() {
+    let whole = with(|recording| highd::quantize(recording).unwrap());
+    let frames = whole.tracks.iter().map(Track::last_frame).max().unwrap();
+    let driven = |recordings: &[Recording]| {
+        let dir = tempfile::tempdir().unwrap();
+        recordings.iter().for_each(|recording| highd::write(dir.path(), recording).unwrap());
+        let found = load(dir.path());
+        let problems: Vec<String> = found.problems.iter().map(ToString::to_string).collect();
+        (found.driven().unwrap(), problems)
+    };
+    let named = |id: &str| Recording { id: id.to_owned(), ..whole.clone() };
+    let (alone, problems) = driven(&[named("01")]);
+    assert_eq!(problems, [""; 0]);
+    let later = [frames * 3 / 4, frames];
+    for (recordings, expected) in [
+        (vec![named("01"), clip(&whole, "02", later)], "recording 02: it is recording 01 again"),
+        (vec![clip(&whole, "01", later), named("02")], "recording 01: it is recording 02 again"),
+    ] {
+        let (once, problems) = driven(&recordings);
+        assert_eq!(once, alone);
+        assert!(problems.len() == 1 && problems[0].contains(expected), "{problems:?}");
+    }
+    // Two parts that have a third in common.
+    let (_, problems) =
+        driven(&[clip(&whole, "01", [1, frames * 3 / 5]), clip(&whole, "02", [frames * 2 / 5, frames])]);
+    assert!(problems.len() == 1 && problems[0].contains("at 33 % of its instants"), "{problems:?}");
+    // Parts that have nothing in common.
+    let (_, problems) = driven(&[clip(&whole, "01", [1, frames / 2]), clip(&whole, "02", [frames / 2, frames])]);
+    assert_eq!(problems, [""; 0]);
+}
