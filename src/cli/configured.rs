@@ -211,6 +211,16 @@ fn with_config(command: Command) -> Command {
     command.mut_subcommands(with_config).arg(arg.help(help).long_help(format!("{help}\n\n{more}")))
 }
 
+/// Loads a profile and warns about constants that are not in use.
+///
+/// # Errors
+/// As [`Profile::load`].
+pub(super) fn load_profile(name: &str) -> Result<Profile> {
+    let profile = Profile::load(name)?;
+    profile.unusual().iter().for_each(|note| tracing::warn!("{note}"));
+    Ok(profile)
+}
+
 impl Configured {
     /// Combines the layers, and parses the rest of the command line.
     ///
@@ -259,7 +269,7 @@ impl Configured {
     /// # Errors
     /// As [`Configured::profile`].
     pub(super) fn profile_of(&self, name: &str) -> Result<Profile> {
-        let profile = Profile::load(name)?;
+        let profile = load_profile(name)?;
         let Some(dt_s) = self.settings.run.dt_s else { return Ok(profile) };
         profile.with_dt(dt_s).map_err(|error| self.at_origin("run.dt_s", "dt", error))
     }

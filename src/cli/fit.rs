@@ -118,11 +118,9 @@ impl Fit {
     fn files(&self, ids: &[Parameterization]) -> Result<Vec<PathBuf>> {
         let single = self.is_single();
         if single && ids.len() != 1 {
-            return Err(Error::usage(
-                Place::item("--out"),
-                format!("{} is one file, but {} densities are fitted", self.out.display(), ids.len()),
-                "give a folder, or choose one with --parameterizations",
-            ));
+            let problem = format!("{} is one file, but {} densities are fitted", self.out.display(), ids.len());
+            let help = "give a folder, or choose one with --parameterizations";
+            return Err(Error::usage(Place::item("--out"), problem, help));
         }
         let name = |id: &Parameterization| match single {
             true => self.out.clone(),

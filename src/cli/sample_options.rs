@@ -132,17 +132,11 @@ impl Sample {
             return Err(Error::usage(Place::item("--shard"), problem, "leave out the stop rules, or --shard"));
         }
         if !self.proposal.is_empty() && settings.estimator != EstimatorKind::Is {
-            return Err(Error::usage(
-                Place::item("--proposal"),
-                "a given proposal is sampled by importance sampling",
-                "add --estimator is",
-            ));
+            let problem = "a given proposal is sampled by importance sampling";
+            return Err(Error::usage(Place::item("--proposal"), problem, "add --estimator is"));
         }
-        refuse_repeats(
-            || Place::item("--proposal"),
-            self.proposal.iter().map(|path| (canonical(path), path.display())),
-        )?;
-        Ok(())
+        let proposals = self.proposal.iter().map(|path| (canonical(path), path.display()));
+        refuse_repeats(|| Place::item("--proposal"), proposals)
     }
 }
 

@@ -69,11 +69,8 @@ impl Sample {
     pub(super) fn planned(&self, configured: &Configured) -> Result<(sampling::Sample, String)> {
         self.check()?;
         let Some(density) = &self.density else {
-            return Err(Error::usage(
-                Place::item("`density`"),
-                "there is none",
-                "give a file that `lanesweep fit` wrote",
-            ));
+            let help = "give a file that `lanesweep fit` wrote";
+            return Err(Error::usage(Place::item("`density`"), "there is none", help));
         };
         let density = read_density(density)?;
         match self.shards.plan_only || self.shards.is_part() {

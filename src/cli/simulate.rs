@@ -110,7 +110,7 @@ impl Simulate {
             return Ok((traced.into_lanes(&profile), played.unwrap_or_default(), false));
         };
         // The road of --xosc may have lanes of another width.
-        if self.case.says_more_than_lanes() || options.is_none() && self.case.says_a_case() {
+        if self.case.gives_more_than(if options.is_some() { &["lane_width"] } else { &[] }) {
             let help = "leave out the case's flags, or --lane with its --scenarios or --from";
             return wrong("--lane", "the lane is a complete case: the other flags would be ignored", help);
         }
@@ -151,7 +151,7 @@ impl Simulate {
             (None, None) => GivenCase::default(),
         };
         let given = self.case.over(file);
-        if !given.says_a_case() {
+        if given.is_empty() {
             let help = "give a case (--category, --ego-speed, …), --case-file, --table, or a --lane with --from or \
                         --scenarios";
             return Err(Error::usage(Place::item("lanesweep simulate"), "there is nothing to simulate", help));
