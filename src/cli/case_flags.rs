@@ -1,6 +1,7 @@
 //! Concrete cases from flags, a TOML file or a table.
 
 use std::collections::HashMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::Path;
 
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
@@ -113,25 +114,15 @@ impl CaseFlags {
         }
     }
 
-    /// Whether it gives any value of the case.
-    pub(super) fn says_a_case(&self) -> bool {
-        self.parameters != CaseParameters::default()
-    }
-
     /// The initial distance, if given.
     pub(super) fn start(&self) -> Result<Option<Headway>> {
         let is_given = [CaseQuantity::Gap, CaseQuantity::Thw].iter().any(|start| self.parameters[*start].is_some());
         if is_given { self.over(GivenCase::default()).headway().map(Some) } else { Ok(None) }
     }
 
-    /// Whether it gives a value of the case other than the width of the lanes.
-    pub(super) fn says_more_than_lanes(&self) -> bool {
-        self.parameters.given().iter().any(|key| *key != "lane_width")
-    }
-
-    /// Whether it gives a value of the case other than the ego's start.
-    pub(super) fn says_more_than_a_start(&self) -> bool {
-        self.parameters.given().iter().any(|key| !matches!(*key, "gap" | "thw"))
+    /// Whether it gives a value of the case other than these.
+    pub(super) fn gives_more_than(&self, keys: &[&str]) -> bool {
+        self.parameters.given().iter().any(|key| !keys.contains(key))
     }
 
     /// The named models; `None` if none is named.
@@ -141,9 +132,9 @@ impl CaseFlags {
 }
 
 impl GivenCase {
-    /// Whether it gives any value of the case.
-    pub(super) fn says_a_case(&self) -> bool {
-        self.parameters != CaseParameters::default()
+    /// Whether it gives no value of the case.
+    pub(super) fn is_empty(&self) -> bool {
+        self.parameters == CaseParameters::default()
     }
 
     /// The named models in the given order; all if none is named.
@@ -186,7 +177,11 @@ impl GivenCase {
 
     /// The numbers of the case.
     pub(super) fn plain_case(&self, profile: &Profile, doubts: &mut Doubts) -> Result<PlainCase> {
-        let plain = self.located(self.parameters.clone().checked_case(&profile.frame, doubts))?;
+        let place = |key: &str| self.row.as_ref().map_or(key.to_owned(), |row| row.of(key).to_string());
+        let (mut parameters, frame) = (self.parameters.clone(), &profile.frame);
+        let size_m = [frame.default_length_m, frame.default_width_m];
+        let plain = parameters.checked_case(size_m, frame.time_cap_s, doubts, &place);
+        let plain = self.located(plain)?;
         self.headway()?;
         Ok(plain)
     }
@@ -212,13 +207,18 @@ pub(super) struct GivenCases {
     lines: HashMap<String, u64>,
     /// Where each id of several rows was last.
     doubled: HashMap<String, u64>,
+    /// First row of each case, by the hash of its values.
+    cases: HashMap<u64, usize>,
+    /// Rows that are equal to an earlier one but for their ids, with that one.
+    copies: Vec<[usize; 2]>,
 }
 
 impl GivenCases {
     pub(super) fn open(path: &Path) -> Result<GivenCases> {
         let format = TableFormat::of(&plain_name(path), &[TableFormat::Csv, TableFormat::Parquet], &option("table"))?;
         let rows = ParameterRows::new(TableReader::open(path, format)?)?;
-        Ok(GivenCases { rows, row: 0, lines: HashMap::new(), doubled: HashMap::new() })
+        let (row, lines, doubled, cases, copies) = Default::default();
+        Ok(GivenCases { rows, row, lines, doubled, cases, copies })
     }
 
     /// Number of the last row, from 1 after the header.
@@ -230,6 +230,15 @@ impl GivenCases {
     pub(super) fn refused_later(&self, id: &str) -> Option<Error> {
         let (first, next) = (self.lines.get(id)?, self.doubled.get(id)?);
         Some(self.rows.row_place(*first).locate(self.doubled_with(*next)))
+    }
+
+    /// Warnings about the rows so far.
+    pub(super) fn notes(&self) -> Vec<String> {
+        let number = self.copies.len();
+        let copies = self.copies.first().map(|[row, earlier]| {
+            format!("{number} row(s) are equal to another one but for their ids and count again, the first: row {row} is row {earlier}")
+        });
+        self.rows.notes().into_iter().chain(copies).collect()
     }
 
     fn doubled_with(&self, line: u64) -> Error {
@@ -248,6 +257,11 @@ impl GivenCases {
                 given.located::<()>(Err(self.doubled_with(first)))?;
             }
             self.lines.extend(given.id.clone().map(|id| (id, line)));
+            let mut hash = DefaultHasher::new();
+            (&given.models, &given.parameters.category).hash(&mut hash);
+            given.parameters.numbers.map(|number| number.map(f64::to_bits)).hash(&mut hash);
+            let first = *self.cases.entry(hash.finish()).or_insert(self.row);
+            self.copies.extend((first < self.row).then_some([self.row, first]));
             Ok(given)
         });
         Ok(Some(row))

@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::case_flags::{CaseFlags, GivenCase, from_table, from_toml};
 use super::check_table::CheckedTable;
-use super::configured::Configured;
+use super::configured::{Configured, load_profile};
 use super::format::FormatFlag;
 use super::source::{PlausibilityFlag, scenarios_of};
 use super::{COMMIT, Exit, Output};
@@ -102,7 +102,7 @@ impl Check {
         )?;
         self.guard_outputs()?;
         let names = if self.profiles.is_empty() { PROFILES.map(str::to_owned).to_vec() } else { self.profiles.clone() };
-        let mut profiles = names.iter().map(|name| Profile::load(name.trim())).collect::<Result<Vec<_>>>()?;
+        let mut profiles = names.iter().map(|name| load_profile(name.trim())).collect::<Result<Vec<_>>>()?;
         let models = self.case.named_models()?.unwrap_or_else(|| ModelId::ALL.to_vec());
         let table = self.whole_table();
         self.guard_flags(table)?;
@@ -157,30 +157,27 @@ impl Check {
 
     /// Refuses flags of one case for a whole table, and flags of a table for one case.
     fn guard_flags(&self, table: Option<&Path>) -> Result<()> {
-        let of_one =
-            [("sheet", self.sheet.is_some()), ("date", self.date.is_some()), ("author", self.author.is_some())];
+        let of_one = [
+            ("sheet", self.sheet.is_some()),
+            ("date", self.date.is_some()),
+            ("author", self.author.is_some()),
+            ("profiles", self.profiles.len() > 1),
+        ];
         let of_tables = [("rows", self.rows.is_some()), ("nominal", self.nominal)];
-        let row = option("row = N");
-        let given =
-            |flags: &[(&'static str, bool)]| flags.iter().find(|(_, is_given)| *is_given).map(|(flag, _)| *flag);
-        let (flag, problem, help) = match table {
-            Some(path) if self.profiles.len() > 1 => (
-                Some("profiles"),
-                format!("{} is judged with all its rows, under one profile", path.display()),
-                format!("name one profile, or choose a row: {row}"),
-            ),
+        let (flags, problem, help) = match table {
             Some(path) => (
-                given(&of_one),
-                format!("it shows one case, and {} is judged with all its rows", path.display()),
-                format!("choose a row: {row}, from 1 after the header"),
+                &of_one[..],
+                format!("it needs one case, and {} is judged with all its rows, under one profile", path.display()),
+                format!("choose a row: {}, from 1 after the header", option("row = N")),
             ),
             None => (
-                given(&of_tables),
+                &of_tables[..],
                 "it is of a table of cases, and this is one case".to_owned(),
                 format!("give a table (.csv, .parquet) without {}, or leave it out", option("row")),
             ),
         };
-        flag.map_or(Ok(()), |flag| Err(Error::usage(Place::option(flag), problem, help)))
+        let given = flags.iter().find(|(_, is_given)| *is_given);
+        given.map_or(Ok(()), |(flag, _)| Err(Error::usage(Place::option(flag), problem, help)))
     }
 
     fn request(&self, profile: &Profile) -> Result<CheckRequest> {
@@ -189,44 +186,35 @@ impl Check {
         };
         let origin = path.display().to_string();
         let ending = plain_name(path).extension().map(|ending| ending.to_ascii_lowercase()).unwrap_or_default();
-        match (ending.to_str().unwrap_or_default(), &self.scenario) {
-            ("toml", None) if self.row.is_some() => {
-                let problem = format!("{origin} is one case and has no rows");
-                Err(Error::usage(Place::option("row"), problem, "leave it out, or give a table (.csv, .parquet)"))
-            }
-            ("toml", None) => self.of_flags(from_toml(path)?, profile, origin),
+        let without_row = format!("leave out {}, or give a table (.csv, .parquet)", option("row"));
+        let with_id = format!("name one: {}", option("scenario = ID"));
+        let (problem, help) = match (ending.to_str().unwrap_or_default(), &self.scenario) {
+            ("toml", None) if self.row.is_none() => return self.of_flags(from_toml(path)?, profile, origin),
             ("csv" | "parquet", None) => {
                 let row = self.row.unwrap_or(1);
-                self.of_flags(from_table(path, Some(row))?, profile, format!("{origin}, row {row}"))
+                return self.of_flags(from_table(path, Some(row))?, profile, format!("{origin}, row {row}"));
             }
             ("jsonl" | "csv" | "parquet", Some(id)) => {
                 let (scenarios, incomplete) = scenarios_of(path, self.plausibility.policy())?;
                 let found = scenarios.iter().find(|scenario| scenario.id == *id).cloned();
                 let found = found.ok_or_else(|| unknown(path, id, &scenarios))?;
-                self.of_scenario(found, format!("{id} of {origin}"), incomplete)
+                return self.of_scenario(found, format!("{id} of {origin}"), incomplete);
             }
-            ("jsonl", None) => {
-                let help = format!("name one: {}", option("scenario = ID"));
-                Err(Error::usage(Place::file(path), "a scenario file has many scenarios", help))
-            }
-            ("xosc", _) => {
-                let help = "give a .jsonl scenario file; OpenSCENARIO is written by `simulate`, not read";
-                Err(Error::usage(Place::file(path), "OpenSCENARIO files are not read as cases", help))
-            }
-            (_, Some(_)) => {
-                let help = "give a .jsonl, .csv or .parquet file of scenarios";
-                Err(Error::usage(Place::option("scenario"), format!("{origin} has no scenarios"), help))
-            }
-            _ => {
-                let help = "give a .toml, .csv, .parquet or .jsonl file";
-                Err(Error::usage(Place::file(path), "this kind of file holds no case", help))
-            }
-        }
+            ("toml", None) => ("one case has no rows", &*without_row),
+            ("jsonl", None) => ("a scenario file has many scenarios", &*with_id),
+            ("xosc", _) => (
+                "OpenSCENARIO files are not read as cases",
+                "give a .jsonl scenario file; OpenSCENARIO is written by `simulate`, not read",
+            ),
+            (_, Some(_)) => ("it has no scenarios", "give a .jsonl, .csv or .parquet file of scenarios"),
+            _ => ("this kind of file holds no case", "give a .toml, .csv, .parquet or .jsonl file"),
+        };
+        Err(Error::usage(Place::file(path), problem, help))
     }
 
     fn of_flags(&self, file: GivenCase, profile: &Profile, origin: String) -> Result<CheckRequest> {
         let given = self.case.over(file);
-        if !given.says_a_case() {
+        if given.is_empty() {
             let help = format!("give a case ({}, {}, …) or a file", option("category"), option("ego_speed"));
             return Err(Error::usage(Place::item("lanesweep check"), "there is nothing to check", help));
         }
@@ -238,12 +226,10 @@ impl Check {
 
     fn of_scenario(&self, scenario: Scenario, origin: String, incomplete: bool) -> Result<CheckRequest> {
         let headway = self.case.start()?;
-        if self.case.says_more_than_a_start() {
-            return Err(Error::usage(
-                Place::item(origin),
-                "the scenario is a complete case: the others would be ignored",
-                format!("keep {} or {}, and leave out the other options of a case", option("gap"), option("thw")),
-            ));
+        if self.case.gives_more_than(&["gap", "thw"]) {
+            let problem = "the scenario is a complete case: the others would be ignored";
+            let help = format!("keep {} or {}, and leave out the others of a case", option("gap"), option("thw"));
+            return Err(Error::usage(Place::item(origin), problem, help));
         }
         let is_synthetic = scenario.synthetic;
         let subject = Subject::recorded(scenario, headway)?;
@@ -266,14 +252,7 @@ impl Check {
 }
 
 fn unknown(path: &Path, id: &str, scenarios: &[Scenario]) -> Error {
-    let example = scenarios
-        .iter()
-        .find(|scenario| scenario.kept)
-        .map_or(String::new(), |scenario| format!(", for instance {}", scenario.id));
-    let problem = format!("it has no scenario `{id}`");
-    Error::usage(
-        Place::file(path),
-        problem,
-        format!("give the id of one of its {} scenarios{example}", scenarios.len()),
-    )
+    let example = scenarios.iter().find(|of| of.kept).map_or(String::new(), |of| format!(", for instance {}", of.id));
+    let help = format!("give the id of one of its {} scenarios{example}", scenarios.len());
+    Error::usage(Place::file(path), format!("it has no scenario `{id}`"), help)
 }

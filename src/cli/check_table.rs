@@ -15,6 +15,7 @@ use lanesweep_engine::Executor;
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::plausibility::{Doubts, Implausible};
 use lanesweep_model::profile::Profile;
+use lanesweep_model::scenario::COLUMNS_HELP;
 use lanesweep_report::case_identity::CaseIdentity;
 use lanesweep_report::case_sheet::CaseSheet;
 use lanesweep_report::case_table::{CaseAnswer, CaseAnswers};
@@ -70,10 +71,7 @@ impl CheckedTable<'_> {
                 };
                 // In the order of the rows.
                 for answer in answers {
-                    match answer {
-                        Ok(answer) => cases.push(answer),
-                        Err(error) => broken.push(error),
-                    }
+                    answer.map_or_else(|error| broken.push(error), |answer| cases.push(answer));
                 }
                 CANCEL.check()?;
             }
@@ -81,17 +79,15 @@ impl CheckedTable<'_> {
         })?;
         unchanged(self.path)?;
         cases.retain(|case: &CaseAnswer| {
-            let refused = case.id().and_then(|id| table.refused_later(id));
-            let is_used = refused.is_none();
-            broken.extend(refused);
-            is_used
+            let before = broken.len();
+            broken.extend(case.id().and_then(|id| table.refused_later(id)));
+            broken.len() == before
         });
         doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
-        complain_of(&broken, &[]);
+        complain_of(&broken, &table.notes());
         if cases.is_empty() {
-            let help = "the chapter on tables lists the columns (docs/src/tables.md)";
             let problem = if table.row() == 0 { "it has no rows" } else { "no row of it can be judged" };
-            return Err(Error::input(Place::file(self.path), problem, help));
+            return Err(Error::input(Place::file(self.path), problem, COLUMNS_HELP));
         }
         let broken: Vec<String> = broken.iter().map(ToString::to_string).collect();
         let is_complete = broken.is_empty();

@@ -11,6 +11,7 @@ use super::{Exit, Output, console};
 use crate::settings::{
     Assignment, DEFAULT_FILE, DEFAULT_FILE_NAME, Layers, Setting, profile_schema, settings_schema, text_of,
 };
+use lanesweep_model::profile::Profile;
 use lanesweep_report::records::document;
 use lanesweep_support::files::write_atomically;
 use lanesweep_support::plain_text::quoted_word;
@@ -40,11 +41,11 @@ enum ConfigVerb {
     Man(Man),
 }
 
-/// Write the commented default configuration: every key with its default, unit, range and source
+/// Write the commented default configuration: every key with its default, unit, range and source; or a shipped profile
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  lanesweep config init")]
+#[command(after_help = "Examples:\n  lanesweep config init\n  lanesweep config init un-r157.toml")]
 struct Init {
-    /// File to write; `-` prints it
+    /// File to write; `-` prints it; under the name of a shipped profile it is that profile
     #[arg(value_name = "FILE", default_value = DEFAULT_FILE_NAME, help_heading = "Data")]
     file: PathBuf,
 }
@@ -125,9 +126,12 @@ impl Init {
             let help = "choose another name, or move it away; `lanesweep config init -` prints the file";
             return Err(Error::usage(Place::file(&self.file), "it exists already and is not overwritten", help));
         }
-        write_atomically(&self.file, DEFAULT_FILE.as_bytes())?;
+        let is_profile = |name: &str| self.file.file_stem().is_some_and(|stem| stem == name);
+        let profile = Profile::names().zip(Profile::files()).find(|(name, _)| is_profile(name));
+        let (flag, text) = profile.map_or(("config", DEFAULT_FILE), |(_, text)| ("profile", text));
+        write_atomically(&self.file, text.as_bytes())?;
         let file = self.file.display().to_string();
-        let text = format!("{file} written; use it with --config {}\n", quoted_word(&file));
+        let text = format!("{file} written; use it with --{flag} {}\n", quoted_word(&file));
         console::print(&text)?;
         Ok(Exit::Ok.into())
     }

@@ -171,6 +171,16 @@ fn with_config(command: Command) -> Command {
     command.mut_subcommands(with_config).arg(arg.help(help).long_help(format!("{help}\n\n{more}")))
 }
 
+/// Loads a profile and warns about constants that are not in use.
+///
+/// # Errors
+/// As [`Profile::load`].
+pub(super) fn load_profile(name: &str) -> Result<Profile> {
+    let profile = Profile::load(name)?;
+    profile.unusual().iter().for_each(|note| tracing::warn!("{note}"));
+    Ok(profile)
+}
+
 impl Configured {
     /// Combines the layers, and parses the rest of the command line.
     ///
@@ -219,7 +229,7 @@ impl Configured {
     /// # Errors
     /// As [`Configured::profile`].
     pub(super) fn profile_of(&self, name: &str) -> Result<Profile> {
-        let profile = Profile::load(name)?;
+        let profile = load_profile(name)?;
         let Some(dt_s) = self.settings.run.dt_s else { return Ok(profile) };
         profile.with_dt(dt_s).map_err(|error| self.at_origin("run.dt_s", "dt", error))
     }
@@ -293,7 +303,11 @@ impl Configured {
     /// [`Error::Usage`].
     pub(super) fn refuse_with_plan(&self) -> Result<()> {
         let are_files_typed = std::env::var_os(FILE_VARIABLE).is_none();
-        self.refuse_lane_keys(are_files_typed, &format!("is decided by the plan ({})", option("plan")), "leave it out, or make another plan")
+        self.refuse_lane_keys(
+            are_files_typed,
+            &format!("is decided by the plan ({})", option("plan")),
+            "leave it out, or make another plan",
+        )
     }
 
     /// Refuses `--config KEY=VALUE` about lanes where `why` says that it has no effect. Files are allowed, because

@@ -118,11 +118,9 @@ impl Fit {
     fn files(&self, ids: &[Parameterization]) -> Result<Vec<PathBuf>> {
         let single = self.is_single();
         if single && ids.len() != 1 {
-            return Err(Error::usage(
-                Place::option("out"),
-                format!("{} is one file, but {} densities are fitted", self.out.display(), ids.len()),
-                format!("give a folder, or choose one with {}", option("parameterizations")),
-            ));
+            let problem = format!("{} is one file, but {} densities are fitted", self.out.display(), ids.len());
+            let help = format!("give a folder, or choose one with {}", option("parameterizations"));
+            return Err(Error::usage(Place::option("out"), problem, help));
         }
         let name = |id: &Parameterization| match single {
             true => self.out.clone(),

@@ -44,8 +44,8 @@ use clap::{Args, FromArgMatches, Parser, Subcommand};
 use configured::Configured;
 use console::Verbosity;
 
-use lanesweep_support::input_file::guarded;
 use lanesweep_support::error::{Notation, write_options_as};
+use lanesweep_support::input_file::guarded;
 use lanesweep_support::{Error, Result, option};
 
 #[derive(Parser)]

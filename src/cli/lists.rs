@@ -13,23 +13,6 @@ use lanesweep_model::scenario::parameterization::Parameterization;
 use lanesweep_support::ranges::refuse_repeats;
 use lanesweep_support::{Error, Place, Result, option};
 
-/// Parses the categories of a flag, in the order of every table; all if the list is empty.
-pub(super) fn categories(list: &[String], option: &'static str) -> Result<Vec<Category>> {
-    if list.is_empty() {
-        return Ok(Category::ALL.to_vec());
-    }
-    let parse = |text: &String| {
-        Category::parse(text.trim()).ok_or_else(|| {
-            let problem = format!("there is no category `{text}`");
-            Error::usage(Place::option(option), problem, "use cut-in, cut-out, lvd")
-        })
-    };
-    let mut found = list.iter().map(parse).collect::<Result<Vec<_>>>()?;
-    refuse_repeats(|| Place::option(option), found.iter().zip(list.iter().map(|text| text.trim())))?;
-    found.sort();
-    Ok(found)
-}
-
 /// `--categories`.
 #[derive(Debug, Clone, Args)]
 pub(super) struct CategoriesFlag {
@@ -39,12 +22,19 @@ pub(super) struct CategoriesFlag {
 }
 
 impl CategoriesFlag {
-    /// In the order of every table.
+    /// In the order of every table; all if the list is empty.
     ///
     /// # Errors
-    /// [`Error::Usage`] for an unknown category.
+    /// [`Error::Usage`] for an unknown or repeated category.
     pub(super) fn list(&self) -> Result<Vec<Category>> {
-        categories(&self.categories, "categories")
+        let (list, place) = (&self.categories, || Place::option("categories"));
+        if list.is_empty() {
+            return Ok(Category::ALL.to_vec());
+        }
+        let mut found = list.iter().map(|text| Category::named(text.trim(), place())).collect::<Result<Vec<_>>>()?;
+        refuse_repeats(place, found.iter().zip(list.iter().map(|text| text.trim())))?;
+        found.sort();
+        Ok(found)
     }
 }
 
@@ -59,12 +49,31 @@ pub(super) struct ParameterizationsFlag {
 }
 
 impl ParameterizationsFlag {
-    /// The parameterizations of the categories, in the registry's order.
+    /// The parameterizations of the categories, in the registry's order; all if the list is empty.
     ///
     /// # Errors
-    /// As [`parameterizations`].
+    /// [`Error::Usage`] for an unknown or repeated parameterization.
     pub(super) fn list(&self, categories: &[Category]) -> Result<Vec<Parameterization>> {
-        parameterizations(categories, &self.parameterizations)
+        let of_categories = || Parameterization::ALL.into_iter().filter(|p| categories.contains(&p.category));
+        let wanted: Vec<&str> = self.parameterizations.iter().map(|key| key.trim()).collect();
+        let of_all = wanted.iter().filter(|key| **key == "all");
+        let every = of_all.flat_map(|all| of_categories().map(|p| (p.key, *all)));
+        let named = wanted.iter().filter(|key| **key != "all").map(|key| (*key, *key));
+        refuse_repeats(|| Place::option("parameterizations"), every.chain(named))?;
+        if wanted.is_empty() || wanted.contains(&"all") {
+            return Ok(of_categories().collect());
+        }
+        if let Some(unknown) = wanted.iter().find(|key| of_categories().all(|p| p.key != **key)) {
+            let of = |c: &Category| {
+                let keys: Vec<_> = Parameterization::of(*c).map(|p| p.key).collect();
+                format!("{}: {}", c.label(), keys.join(" "))
+            };
+            let names: Vec<&str> = categories.iter().map(|c| c.label()).collect();
+            let problem = format!("there is no parameterization `{unknown}` of {}", names.join(", "));
+            let help = format!("use {}, or all", Category::ALL.iter().map(of).collect::<Vec<_>>().join("; "));
+            return Err(Error::usage(Place::option("parameterizations"), problem, help));
+        }
+        Ok(of_categories().filter(|p| wanted.contains(&p.key)).collect())
     }
 }
 
@@ -140,19 +149,11 @@ impl CriterionFlag {
     /// # Errors
     /// [`Error::Usage`] for an unknown criterion.
     pub(super) fn get(&self) -> Result<Criterion> {
-        criterion(&self.criterion)
+        Criterion::parse(self.criterion.trim()).ok_or_else(|| {
+            let problem = format!("there is no criterion `{}`", self.criterion);
+            Error::usage(Place::option("criterion"), problem, "use collision, ttc or btn")
+        })
     }
-}
-
-/// The criterion of `--criterion`.
-///
-/// # Errors
-/// [`Error::Usage`] for an unknown criterion.
-pub(super) fn criterion(name: &str) -> Result<Criterion> {
-    Criterion::parse(name.trim()).ok_or_else(|| {
-        let problem = format!("there is no criterion `{name}`");
-        Error::usage(Place::option("criterion"), problem, "use collision, ttc or btn")
-    })
 }
 
 /// `--hours` and `--km`.
@@ -190,11 +191,8 @@ pub(super) fn models<'a>(list: impl IntoIterator<Item = &'a str>, option: &'stat
             None if text == "all" => named.extend(ModelId::ALL.map(|model| (model, text))),
             None => {
                 let problem = format!("there is no driver model `{text}`");
-                return Err(Error::usage(
-                    Place::option(option),
-                    problem,
-                    format!("use one of {}, or all", ModelId::names()),
-                ));
+                let help = format!("use one of {}, or all", ModelId::names());
+                return Err(Error::usage(Place::option(option), problem, help));
             }
         }
     }
@@ -230,34 +228,4 @@ pub(super) fn headways(list: &[String]) -> Result<Vec<Headway>> {
     let meanings = found.iter().map(|headway| headway.identity());
     refuse_repeats(|| Place::option("thw"), meanings.zip(list.iter().map(|text| text.trim())))?;
     Ok(found)
-}
-
-/// Finds the parameterizations of `--parameterizations` among those of the categories, in the registry's order; all if
-/// the list is empty.
-///
-/// # Errors
-/// [`Error::Usage`] for an unknown or repeated parameterization.
-fn parameterizations(categories: &[Category], list: &[String]) -> Result<Vec<Parameterization>> {
-    let of_categories = || Parameterization::ALL.into_iter().filter(|p| categories.contains(&p.category));
-    let wanted: Vec<&str> = list.iter().map(|key| key.trim()).collect();
-    let of_all = wanted.iter().filter(|key| **key == "all");
-    let every = of_all.flat_map(|all| of_categories().map(|p| (p.key, *all)));
-    let named = wanted.iter().filter(|key| **key != "all").map(|key| (*key, *key));
-    refuse_repeats(|| Place::option("parameterizations"), every.chain(named))?;
-    if wanted.is_empty() || wanted.contains(&"all") {
-        return Ok(of_categories().collect());
-    }
-    if let Some(unknown) = wanted.iter().find(|key| of_categories().all(|p| p.key != **key)) {
-        let of = |c: &Category| {
-            let keys: Vec<_> = Parameterization::of(*c).map(|p| p.key).collect();
-            format!("{}: {}", c.label(), keys.join(" "))
-        };
-        let names: Vec<&str> = categories.iter().map(|c| c.label()).collect();
-        return Err(Error::usage(
-            Place::option("parameterizations"),
-            format!("there is no parameterization `{unknown}` of {}", names.join(", ")),
-            format!("use {}, or all", Category::ALL.iter().map(of).collect::<Vec<_>>().join("; ")),
-        ));
-    }
-    Ok(of_categories().filter(|p| wanted.contains(&p.key)).collect())
 }

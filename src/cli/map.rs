@@ -19,7 +19,7 @@ use lanesweep_report::map::MapReport;
 use lanesweep_run::grid::{self, Grid, GridText, MapGrids, MapOptions, MapResult, PARAMETERS, presets::Presets};
 use lanesweep_support::readable::{count, value};
 use lanesweep_support::run_folder::RunFolder;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Seed of the random selection of device lanes that the CPU recomputes.
 const RECHECK_SEED: u64 = 1;
@@ -92,7 +92,7 @@ impl Map {
         let criterion = self.criterion.get()?;
         let profile = self.profile(configured)?;
         let options = MapOptions {
-            grids: self.grids(category, &configured.settings.map)?,
+            grids: self.grids(category, &configured.settings.map, &profile)?,
             models: self.models.named()?,
             criterion,
             robust: self.robust,
@@ -127,31 +127,19 @@ impl Map {
     }
 
     /// Builds the grids from flags and settings.
-    fn grids(&self, category: Category, settings: &MapSettings) -> Result<MapGrids> {
-        match self.preset.as_deref() {
-            Some(name) => match Presets::find(name) {
-                Some(presets) => Ok(MapGrids::Preset(presets, category)),
-                None => {
-                    let problem = format!("there is no preset `{name}`");
-                    let help = format!("presets: {}", Presets::ALL.map(Presets::name).join(", "));
-                    Err(Error::usage(Place::option("preset"), problem, help))
-                }
-            },
-            None => {
-                let text = GridText {
-                    x: self.x.clone(),
-                    y: self.y.clone(),
-                    panel: self.panel.clone(),
-                    set: self.set.clone(),
-                    native_gap: settings.native_gap,
-                    closing_only: settings.closing,
-                };
-                let parts = text.parts(category)?;
-                let mut doubts = Doubts::new(self.plausibility.policy());
-                parts.check_plausible(&mut doubts)?;
-                doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
-                Grid::new(parts).map(|grid| MapGrids::Own(Box::new(grid)))
-            }
+    fn grids(&self, category: Category, settings: &MapSettings, profile: &Profile) -> Result<MapGrids> {
+        if let Some(name) = &self.preset {
+            let unknown = || {
+                let help = format!("presets: {}", Presets::ALL.map(Presets::name).join(", "));
+                Error::usage(Place::option("preset"), format!("there is no preset `{name}`"), help)
+            };
+            return Ok(MapGrids::Preset(Presets::find(name).ok_or_else(unknown)?, category));
         }
+        let (x, y, panel, set) = (self.x.clone(), self.y.clone(), self.panel.clone(), self.set.clone());
+        let text = GridText { x, y, panel, set, native_gap: settings.native_gap, closing_only: settings.closing };
+        let (grid, mut doubts) = (Grid::new(text.parts(category)?)?, Doubts::new(self.plausibility.policy()));
+        grid.check_plausible(profile, &mut doubts)?;
+        doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
+        Ok(MapGrids::Own(Box::new(grid)))
     }
 }

@@ -61,17 +61,11 @@ impl Mine {
                 // The provenance file belongs to this scenario file: remove the old one first, write the new one last.
                 DataProvenance::remove_beside(path)?;
                 write_scenarios(path, &collection.scenarios)?;
-                DataProvenance {
-                    data: from.describe(collection.synthetic),
-                    synthetic: collection.synthetic,
-                    scenarios_sha256: input_file::sha256(path)?,
-                    driven: collection.driven(),
-                }
-                .write_beside(
-                    path,
-                    serde_json::json!(configured.record(false)),
-                    collection.record(&configured.settings.mining),
-                )?;
+                let (synthetic, driven) = (collection.synthetic, collection.driven());
+                let (data, scenarios_sha256) = (from.describe(synthetic), input_file::sha256(path)?);
+                let (settings, mined) = (configured.record(false), collection.record(&configured.settings.mining));
+                let provenance = DataProvenance { data, synthetic, scenarios_sha256, driven };
+                provenance.write_beside(path, serde_json::json!(settings), mined)?;
                 tracing::info!("{} written to {}", counted(collection.scenarios.len(), "scenario"), path.display());
             }
             None => {

@@ -129,20 +129,18 @@ impl Sample {
         let is_split = self.shards.is_part() || self.shards.plan_only;
         if is_split && is_crude && (settings.half_width.is_some() || settings.time_limit_s.is_some()) {
             let problem = "a part of a run cannot evaluate a stop rule of the whole run";
-            return Err(Error::usage(Place::option("shard"), problem, format!("leave out the stop rules, or {}", option("shard"))));
-        }
-        if !self.proposal.is_empty() && settings.estimator != EstimatorKind::Is {
             return Err(Error::usage(
-                Place::option("proposal"),
-                "a given proposal is sampled by importance sampling",
-                format!("add {}", option("estimator = is")),
+                Place::option("shard"),
+                problem,
+                format!("leave out the stop rules, or {}", option("shard")),
             ));
         }
-        refuse_repeats(
-            || Place::option("proposal"),
-            self.proposal.iter().map(|path| (canonical(path), path.display())),
-        )?;
-        Ok(())
+        if !self.proposal.is_empty() && settings.estimator != EstimatorKind::Is {
+            let problem = "a given proposal is sampled by importance sampling";
+            return Err(Error::usage(Place::option("proposal"), problem, format!("add {}", option("estimator = is"))));
+        }
+        let proposals = self.proposal.iter().map(|path| (canonical(path), path.display()));
+        refuse_repeats(|| Place::option("proposal"), proposals)
     }
 }
 

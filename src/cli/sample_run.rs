@@ -20,7 +20,7 @@ use lanesweep_support::files::check_folder;
 use lanesweep_support::readable::{count, counted, duration};
 use lanesweep_support::run_folder::RunFolder;
 use lanesweep_support::table::TableWriter;
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Place, Result, option};
 
 impl Sample {
     pub(crate) fn run(&self, configured: &Configured) -> Result<Output> {
@@ -69,11 +69,8 @@ impl Sample {
     pub(super) fn planned(&self, configured: &Configured) -> Result<(sampling::Sample, String)> {
         self.check()?;
         let Some(density) = &self.density else {
-            return Err(Error::usage(
-                Place::option("density"),
-                "there is none",
-                "give a file that `lanesweep fit` wrote",
-            ));
+            let help = "give a file that `lanesweep fit` wrote";
+            return Err(Error::usage(Place::option("density"), "there is none", help));
         };
         let density = read_density(density)?;
         match self.shards.plan_only || self.shards.is_part() {

@@ -111,7 +111,7 @@ impl Simulate {
             return Ok((traced.into_lanes(&profile), played.unwrap_or_default(), false));
         };
         // The road of --xosc may have lanes of another width.
-        if self.case.says_more_than_lanes() || options.is_none() && self.case.says_a_case() {
+        if self.case.gives_more_than(if options.is_some() { &["lane_width"] } else { &[] }) {
             let help = format!("leave out the case's options, or {lane} with its {scenarios} or {from}");
             return wrong("lane", "the lane is a complete case: the others would be ignored".to_owned(), help);
         }
@@ -154,7 +154,7 @@ impl Simulate {
             (None, None) => GivenCase::default(),
         };
         let given = self.case.over(file);
-        if !given.says_a_case() {
+        if given.is_empty() {
             let [category, speed, file, table, lane, from, scenarios] =
                 ["category", "ego_speed", "case_file", "table", "lane", "from", "scenarios"].map(option);
             let help = format!(

@@ -122,20 +122,27 @@ impl SourceFlags {
         load(&self.source(configured), configured, self.plausibility.policy())
     }
 
-    /// Like [`load`], but first reports the source of the data.
-    pub(super) fn report_and_load(&self, configured: &Configured) -> Result<Collection> {
-        tracing::info!("{}", self.source(configured).describe(false));
-        self.load(configured)
-    }
-
-    /// Like [`SourceFlags::report_and_load`], with the provenance; `given` are the flags of the exposure.
+    /// Like [`load`], but first reports the source of the data, and with the provenance. The flags of the exposure
+    /// (`given`) replace all known values: hours of one data set must not mix with kilometres of another.
     pub(super) fn load_with_exposure(
         &self,
         configured: &Configured,
         given: Driven,
     ) -> Result<(Collection, DataProvenance)> {
-        let collection = self.report_and_load(configured)?;
-        let provenance = self.source(configured).provenance(&collection, given)?;
+        let source = self.source(configured);
+        tracing::info!("{}", source.describe(false));
+        let collection = self.load(configured)?;
+        let mut provenance = source.provenance(&collection)?;
+        let recorded = provenance.driven.unwrap_or(given);
+        for (flag, pair) in
+            [("hours", given.hours.zip(recorded.hours)), ("km", given.kilometres.zip(recorded.kilometres))]
+        {
+            if let Some((given, recorded)) = pair.filter(|(given, recorded)| !(0.5..=2.0).contains(&(given / recorded)))
+            {
+                tracing::warn!("--{flag} {given} is used, but the recordings of these scenarios have {recorded:.1}");
+            }
+        }
+        provenance.driven = given.known().or(provenance.driven);
         let Some(driven) = provenance.driven else {
             tracing::warn!(
                 "exposure is unknown, because the scenarios have no driven time and distance; give {} and {}",

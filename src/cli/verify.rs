@@ -116,11 +116,8 @@ impl Verify {
         if plan.unit_count() == 0 {
             let problem = format!("no scenario to simulate ({})", counts_text(&counts(&collection.scenarios)));
             let help = "use more recordings or scenarios that pass the paper's filters";
-            return Err(Error::input(
-                Place::item(self.data.source(configured).describe(collection.synthetic)),
-                problem,
-                help,
-            ));
+            let data = self.data.source(configured).describe(collection.synthetic);
+            return Err(Error::input(Place::item(data), problem, help));
         }
         Ok(plan)
     }

@@ -5,10 +5,11 @@ use serde::{Deserialize, Serialize};
 use lanesweep_support::{Error, Place, Result};
 
 /// The three kinds of scenario of UN R157, Annex 3.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Category {
     /// Another vehicle changes into the ego's lane in front of it.
+    #[default]
     CutIn,
     /// The leader leaves the ego's lane and uncovers a slower vehicle.
     CutOut,

@@ -6,7 +6,7 @@
 
 use std::sync::LazyLock;
 
-use lanesweep_support::option;
+use lanesweep_support::{option, readable};
 
 /// Quantity of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,6 +14,7 @@ use lanesweep_support::option;
 pub enum Quantity {
     Speed,
     LateralSpeed,
+    LaneChangeSpeed,
     Acceleration,
     Gap,
     Headway,
@@ -58,18 +59,22 @@ const fn of(
 
 #[rustfmt::skip] // a table: one line per quantity
 /// The table, in the order of [`Quantity`].
-pub const LIMITS: [Limits; 10] = [
+pub const LIMITS: [Limits; 11] = [
     of(Quantity::Speed, "speed", "m/s", (0.0, 70.0), (0.0, 100.0), &[("km/h", 3.6)]),
     of(Quantity::LateralSpeed, "lateral speed", "m/s", (-5.0, 5.0), (-10.0, 10.0), &[]),
+    of(Quantity::LaneChangeSpeed, "lateral speed of a lane change", "m/s", (0.0, 3.0), (0.0, 10.0), &[("km/h", 3.6)]),
     of(Quantity::Acceleration, "acceleration", "m/s²", (-12.0, 8.0), (-30.0, 30.0), &[]),
     of(Quantity::Gap, "gap", "m", (-50.0, 1000.0), (-1e4, 1e4), &[("cm", 100.0), ("mm", 1000.0)]),
-    of(Quantity::Headway, "time headway", "s", (-60.0, 60.0), (-1e5, 1e5), &[("ms", 1000.0)]),
+    of(Quantity::Headway, "time headway", "s", (-10.0, 10.0), (-1e5, 1e5), &[]),
     of(Quantity::LateralPosition, "lateral position", "m", (-15.0, 15.0), (-100.0, 100.0), LENGTHS),
     of(Quantity::Length, "vehicle length", "m", (1.0, 30.0), (0.1, 100.0), LENGTHS),
-    of(Quantity::Width, "vehicle width", "m", (0.4, 4.0), (0.1, 10.0), LENGTHS),
+    of(Quantity::Width, "vehicle width", "m", (0.4, 3.2), (0.1, 10.0), LENGTHS),
     of(Quantity::LaneWidth, "lane width", "m", (2.0, 6.0), (0.5, 50.0), LENGTHS),
     of(Quantity::Rate, "sample rate", "Hz", (2.0, 200.0), (1.0, 1e4), &[]),
 ];
+
+/// An initial distance up to which every headway is plausible, m: a slow ego is many seconds behind a vehicle that is near.
+pub const NEAR_M: f64 = 100.0;
 
 /// Speeds between this value and 0 are noise of a standing vehicle, m/s.
 pub const NOISE_MPS: f64 = -0.5;
@@ -112,22 +117,15 @@ impl Quantity {
         // A wrong unit makes a number too large; a lorry that is overtaken is far behind.
         let is_large =
             |(_, per_own): &&(&str, f64)| value.abs() > of.plausible.1 && contains(of.plausible, value / per_own);
-        let hint = of.mistaken.iter().find(is_large);
-        let hint = hint.map_or(String::new(), |(unit, per_own)| {
-            format!(
-                "; {} looks like {unit}: {} {}",
-                lanesweep_support::readable::value(value),
-                lanesweep_support::readable::value(value / per_own),
-                of.unit
-            )
-        });
-        format!(
-            "{} {} {words} for {article} {} ({min} to {max} {}){hint}",
-            lanesweep_support::readable::value(value),
-            of.unit,
-            of.name,
-            of.unit
-        )
+        let (unit, text) = (of.unit, readable::value(value));
+        let hint = match of.mistaken.iter().find(is_large) {
+            Some((other, per_own)) => {
+                format!("; {text} looks like {other}: {} {unit}", readable::value(value / per_own))
+            }
+            None if self == Quantity::Headway => "; is it in ms, or a gap in m?".to_owned(),
+            None => String::new(),
+        };
+        format!("{text} {unit} {words} for {article} {} ({min} to {max} {unit}){hint}", of.name)
     }
 }
 
@@ -186,8 +184,23 @@ impl Doubts {
         if self.policy == Implausible::Refused && !contains(quantity.limits().physical, value) {
             return Err(text);
         }
-        self.found[quantity as usize].add(Finding { count: 1, first: format!("{place}: {text}") });
+        self.contradict(quantity, format!("{place}: {text}"));
         Ok(())
+    }
+
+    /// Counts a value that another value contradicts; `text` has its place.
+    pub fn contradict(&mut self, quantity: Quantity, text: String) {
+        self.found[quantity as usize].add(Finding { count: 1, first: text });
+    }
+
+    /// Checks that a vehicle is at least as long as wide; `place` returns the place of its length.
+    #[inline]
+    pub fn check_shape(&mut self, length_m: f64, width_m: f64, place: impl FnOnce() -> String) {
+        // An implausible length or width has its own sentence.
+        if length_m < width_m && Quantity::Length.is_plausible(length_m) && Quantity::Width.is_plausible(width_m) {
+            let [length, width] = [length_m, width_m].map(readable::value);
+            self.contradict(Quantity::Length, format!("{}: {length} m, but the width is {width} m", place()));
+        }
     }
 
     /// Returns a speed with the noise of a standing vehicle set to 0 and counted.

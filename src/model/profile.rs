@@ -132,6 +132,13 @@ const BUILT_IN: [(&str, &str); 6] = [
     ("eu-2022-1426-standing", include_str!("../../configs/profiles/eu-2022-1426-standing.toml")),
 ];
 
+/// Constants of which the first is at most the second.
+const ORDERED: [(&str, &str); 3] = [
+    ("fsm.comfortable_deceleration_mps2", "fsm.max_surrogate_deceleration_mps2"),
+    ("cchdm.coasting_mps2", "cchdm.max_deceleration_mps2"),
+    ("frame.default_width_m", "frame.default_length_m"),
+];
+
 impl Profile {
     /// Names of the profiles that ship with the program.
     pub fn names() -> impl Iterator<Item = &'static str> {
@@ -151,29 +158,22 @@ impl Profile {
         let path = Path::new(name_or_path);
         if !path.exists() && !name_or_path.ends_with(".toml") {
             let near = nearest(name_or_path, Profile::names(), 0.0).unwrap_or("paper");
-            return Err(Error::usage(
-                Place::option("profile"),
-                format!("there is no profile `{name_or_path}`"),
-                format!(
-                    "did you mean `{near}`? Profiles: {}; or give the path of a TOML file",
-                    Profile::names().collect::<Vec<_>>().join(", ")
-                ),
-            ));
+            let names = Profile::names().collect::<Vec<_>>().join(", ");
+            let help = format!("did you mean `{near}`? Profiles: {names}; or give the path of a TOML file");
+            let problem = format!("there is no profile `{name_or_path}`");
+            return Err(Error::usage(Place::option("profile"), problem, help));
         }
         let text = input_file::read_text(path, input_file::MAX_SETTINGS_BYTES)?;
         let mut profile = Profile::parse(&text, &Place::file(path))?;
         // A profile with changed numbers must not keep the name of a shipped profile.
-        let built_in = BUILT_IN.iter().find(|(name, _)| *name == profile.name);
-        if let Some((name, text)) = built_in
-            && Profile::parse(text, &Place::item(format!("built-in profile {name}")))? != profile
-        {
+        if Profile::names().any(|name| name == profile.name) && Profile::load(&profile.name)? != profile {
             profile.name.push_str(" (changed)");
         }
         Ok(profile)
     }
 
     fn parse(text: &str, place: &Place) -> Result<Profile> {
-        let help = "compare with configs/profiles/paper.toml, which has every key with its unit";
+        let help = "`lanesweep config init paper.toml` writes a profile with every key and its unit";
         let profile: Profile = input_file::parse_toml(text, place, help)?;
         profile.check(place)?;
         Ok(profile)
@@ -198,36 +198,46 @@ impl Profile {
         own.chain(self.driver_bounds()).collect()
     }
 
-    /// Checks that every constant is finite and in its range; `place` names the profile in the error.
+    /// Constants that no source or study has, as sentences.
+    pub fn unusual(&self) -> Vec<String> {
+        let unusual = self.bounds().into_iter().filter(|(_, value, bound)| !bound.is_usual(*value));
+        let sentence = |(key, value, Bound { unit, usual: (min, max), .. }): (String, f64, Bound)| {
+            format!(
+                "profile {}, `{key}`: {value} {unit} is used as it is, usual is {min} to {max}: check its unit",
+                self.name
+            )
+        };
+        unusual.map(sentence).collect()
+    }
+
+    /// Checks that every constant is finite, in its range and in its order; `place` names the profile in the error.
     pub fn check(&self, place: &Place) -> Result<()> {
-        let bad = self.bounds().into_iter().find(|(_, value, bound)| !bound.holds(*value));
-        if let Some((key, value, expected)) = bad {
-            return Err(Error::usage(
-                place.clone().of(format!("`{key}`")),
-                format!("{value} is not usable; expected {expected}"),
-                "the chapter on profiles has the range of every key, configs/profiles/paper.toml usual values",
-            ));
+        let bounds = self.bounds();
+        let wrong = |key: &str, problem: String, help: &str| {
+            Err(Error::usage(place.clone().of(format!("`{key}`")), problem, help))
+        };
+        if let Some((key, value, expected)) = bounds.iter().find(|(_, value, bound)| !bound.holds(*value)) {
+            let help = "`lanesweep config schema profile` prints the range of every key";
+            return wrong(key, format!("{value} is not usable; expected {expected}"), help);
+        }
+        let value = |key: &str| bounds.iter().find(|(known, ..)| known == key).map_or(f64::NAN, |(_, value, _)| *value);
+        if let Some((lower, upper)) = ORDERED.iter().find(|(lower, upper)| value(lower) > value(upper)) {
+            let problem = format!("{} is above `{upper}`, {}", value(lower), value(upper));
+            return wrong(lower, problem, "correct one of the two");
         }
         for (key, list) in [("reg157", &self.reg157.always_unsafe), ("cchdm", &self.cchdm.always_unsafe)] {
             let place = || place.clone().of(format!("`{key}.always_unsafe`"));
             refuse_repeats(place, list.iter().map(|category| (*category, category.key())))?;
         }
         if self.reg157.visible_lateral_movement_s > 0.0 && self.reg157.lane_intrusion_m == 0.0 {
-            return Err(Error::usage(
-                place.clone().of("`reg157.visible_lateral_movement_s`"),
-                "movement is visible before a lane intrusion, and `reg157.lane_intrusion_m` is 0",
-                "set lane_intrusion_m (0.3 in un-r157), or 0 for the time of visible movement",
-            ));
+            let problem = "movement is visible before a lane intrusion, and `reg157.lane_intrusion_m` is 0".to_owned();
+            let help = "set lane_intrusion_m (0.3 in un-r157), or 0 for the time of visible movement";
+            return wrong("reg157.visible_lateral_movement_s", problem, help);
         }
-        if self.frame.time_cap_s / self.frame.dt_s > MAX_STEPS {
-            return Err(Error::usage(
-                place.clone().of("`frame.dt_s`"),
-                format!("{} s with a cap of {} s is not usable", self.frame.dt_s, self.frame.time_cap_s),
-                format!(
-                    "use a time step above {} s: a run has at most 4 million steps",
-                    self.frame.time_cap_s / MAX_STEPS
-                ),
-            ));
+        let (dt_s, cap_s) = (self.frame.dt_s, self.frame.time_cap_s);
+        if cap_s / dt_s > MAX_STEPS {
+            let help = format!("use a time step above {} s: a run has at most 4 million steps", cap_s / MAX_STEPS);
+            return wrong("frame.dt_s", format!("{dt_s} s with a cap of {cap_s} s is not usable"), &help);
         }
         Ok(())
     }
@@ -245,14 +255,11 @@ impl Profile {
         if self.frame.dt_s <= longest_s {
             return Ok(());
         }
-        Err(Error::usage(
-            Place::item("`frame.dt_s`"),
-            format!("a time step of {} s is too long: `{key}` allows {longest_s} s", self.frame.dt_s),
-            format!(
-                "use a time step ({}) of at most {longest_s} s, or leave out the driver model that needs it",
-                option("dt")
-            ),
-        ))
+        let problem = format!("a time step of {} s is too long: `{key}` allows {longest_s} s", self.frame.dt_s);
+        let dt = option("dt");
+        let help =
+            format!("use a time step ({dt}) of at most {longest_s} s, or leave out the driver model that needs it");
+        Err(Error::usage(Place::item("`frame.dt_s`"), problem, help))
     }
 
     /// The same profile at another time step.
@@ -274,7 +281,7 @@ mod tests {
 
     use crate::driver::ModelId;
     use lanesweep_support::plain_text::cut;
-    use serde_json::Value;
+    use std::collections::BTreeSet;
 
     #[test]
     fn every_built_in_profile_is_complete_and_named_as_it_is_called() {
@@ -301,27 +308,12 @@ mod tests {
         assert!(error.help().unwrap().contains("did you mean `paper`"), "{error:?}");
     }
 
-    /// Passes the keys of all numbers in a table to `each`.
-    fn numbers(value: &Value, key: &str, each: &mut dyn FnMut(&str)) {
-        match value {
-            Value::Object(fields) => fields.iter().for_each(|(name, inner)| {
-                numbers(inner, &if key.is_empty() { name.clone() } else { format!("{key}.{name}") }, each);
-            }),
-            Value::Number(_) => each(key),
-            _ => {}
-        }
-    }
-
     #[test]
     fn every_number_of_a_profile_has_a_range() {
         let profile = Profile::load("paper").unwrap();
-        let bounds = profile.bounds();
-        let mut left: Vec<&str> = bounds.iter().map(|(key, ..)| key.as_str()).collect();
-        numbers(&serde_json::to_value(&profile).unwrap(), "", &mut |key| {
-            let at = left.iter().position(|known| *known == key).unwrap_or_else(|| panic!("`{key}` has no range"));
-            left.remove(at);
-        });
-        assert_eq!(left, Vec::<&str>::new());
+        let numbers = profile.assumptions().into_iter().filter(|of| of.value.is_number()).map(|of| of.key);
+        let bounds = profile.bounds().into_iter().map(|(key, ..)| key);
+        assert_eq!(numbers.collect::<BTreeSet<_>>(), bounds.collect());
     }
 
     /// Values whose results are not normal numbers in binary32, and one in another unit.
@@ -348,14 +340,6 @@ mod tests {
                 assert!(error.contains(part), "{part}: {error}");
             }
         }
-    }
-
-    #[test]
-    fn a_lateral_acceleration_below_one_is_in_use() {
-        let text = toml::to_string(&Profile::load("paper").unwrap()).unwrap();
-        let mut table: toml::Value = toml::from_str(&text).unwrap();
-        table["rss"]["lateral_acceleration_mps2"] = toml::Value::Float(0.8);
-        Profile::parse(&toml::to_string(&table).unwrap(), &Place::file(Path::new("own.toml"))).unwrap();
     }
 
     #[test]

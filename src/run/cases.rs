@@ -40,10 +40,10 @@ impl Cases {
     ) -> Result<Cases> {
         let mut doubts = Doubts::new(implausible);
         let mut cases = CaseRows::default();
-        for (row, parameters) in rows.into_iter().enumerate() {
+        for (row, parameters) in (first_row..).zip(rows) {
             cases
-                .push(|tables| encode(parameters, profile, headways, tables, &mut doubts))
-                .map_err(|error| of_row(first_row + row as u64, error))?;
+                .push(|tables| encode(parameters, profile, headways, tables, &mut doubts, row))
+                .map_err(|error| of_row(row, error))?;
         }
         if cases.count == 0 {
             return Err(Error::usage(Place::item("cases"), "there are no rows", "give at least one case"));
@@ -138,14 +138,17 @@ fn encode(
     headways: &[Headway],
     tables: &mut Tables<f64>,
     doubts: &mut Doubts,
+    row: u64,
 ) -> Result<(Category, LaneCase<f64>)> {
-    let plain = parameters.checked_case(&profile.frame, doubts)?;
+    let place = |key: &str| place_of(row, key).to_string();
+    let (frame, size_m) = (&profile.frame, [profile.frame.default_length_m, profile.frame.default_width_m]);
+    let plain = parameters.checked_case(size_m, frame.time_cap_s, doubts, &place)?;
     let (gap_m, thw_s) = (parameters[CaseQuantity::Gap], parameters[CaseQuantity::Thw]);
     let start = match (gap_m, thw_s) {
         (Some(gap_m), _) => Some(Start::Gap(gap_m)),
         (None, thw_s) => thw_s.map(Start::Headway),
     };
-    let mut case = LaneCase::encode(&plain.case(profile.frame.time_cap_s)?, profile, tables);
+    let mut case = LaneCase::encode(&plain.case(frame.time_cap_s)?, profile, tables);
     match (start, headways.is_empty()) {
         (Some(start), true) => case = case.ahead_by(start.gap(plain.ego_speed_mps)),
         (None, false) => {}
@@ -162,12 +165,16 @@ fn encode(
     Ok((plain.category, case))
 }
 
+/// The place of a value of a row.
+fn place_of(row: u64, key: &str) -> Place {
+    Place::item(format!("row {row}")).column(key)
+}
+
 /// Adds the row to an error about a value.
 fn of_row(row: u64, error: Error) -> Error {
     match error {
         Error::Usage { place, problem, help } => {
-            let key = place.item.unwrap_or_default();
-            Error::input(Place::item(format!("row {row}")).column(key), problem, help)
+            Error::input(place_of(row, &place.item.unwrap_or_default()), problem, help)
         }
         other => other,
     }

@@ -96,12 +96,11 @@ impl Source {
         Ok(collection)
     }
 
-    /// The provenance of the scenarios loaded from here. If the user gives hours or kilometres (`given`), they replace all known
-    /// values: hours of one data set must not mix with kilometres of another.
+    /// The provenance of the scenarios loaded from here.
     ///
     /// # Errors
     /// [`Error::Io`](lanesweep_support::error::Error::Io); as [`DataProvenance::read_beside`].
-    pub fn provenance(&self, collection: &Collection, given: Driven) -> Result<DataProvenance> {
+    pub fn provenance(&self, collection: &Collection) -> Result<DataProvenance> {
         let mut provenance = DataProvenance {
             data: self.describe(collection.synthetic),
             synthetic: collection.synthetic,
@@ -116,7 +115,6 @@ impl Source {
                 (provenance.synthetic, provenance.data) = (true, beside.data);
             }
         }
-        provenance.driven = given.known().or(provenance.driven);
         Ok(provenance)
     }
 

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use lanesweep::scenario::read_scenario_file;
 use serde_json::Value;
 
 use crate::common::program::{lanesweep, ran, refused, said, unbroken, words};
@@ -173,4 +174,95 @@ fn a_nominal_batch_answers_by_lanes_and_says_that_nothing_else_was_examined() {
         assert_eq!(case["verdict"], row.1, "{case}");
     }
     assert_eq!(document(dir, &format!("{nominal} --threads 1")), found, "threads change nothing");
+}
+
+/// What `check` and every verb that takes `--scenarios` say of a table, in one line each.
+fn notes(dir: &Path, table: &str) -> [String; 2] {
+    file(dir, "t.csv", table);
+    let (code, text) = said(dir, "check t.csv --nominal --backend cpu");
+    assert!([0, 1, 8, 9, 10].contains(&code), "{code}: {text}");
+    let read = read_scenario_file(&dir.join("t.csv"), Default::default()).unwrap();
+    assert!(read.problems.is_empty(), "{:?}", read.problems);
+    [text, read.notes.join("; ")]
+}
+
+#[test]
+fn every_verb_doubts_the_same_values_of_a_table_and_names_their_place() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let header = "id,category,ego_speed_kmh,speed,thw_s,lateral_speed_mps,length,width,ego_length,ahead_gap";
+    let table = |rows: &[&str]| format!("{header}\n{}\n", rows.join("\n"));
+    let good = [
+        "a,cut-in,108,80km/h,1.2,1.0,4.5,1.8,,",
+        "b,cut-in,60,50km/h,2,0.6,18,2.55,4.5,",
+        "c,cut-in,70,60km/h,2,0.6,,,,",
+    ];
+    // A slow ego is many seconds behind a vehicle that is near.
+    let slow = "s,cut-in,5,4km/h,25,0.5,,,,";
+    for clean in notes(dir, &table(&[&good[..], &[slow]].concat())) {
+        assert!(!clean.contains("implausible") && !clean.contains("but the"), "{clean}");
+    }
+    for (rows, expected) in [
+        (
+            &["d,cut-in,108,80km/h,25,1,,,,", "e,cut-in,108,80km/h,40,1,,,,", "f,cut-in,90,80km/h,15,1,,,,"][..],
+            "t.csv, line 2, column `thw_s`: 25 s is not plausible for a time headway (-10 to 10 s); is it in ms, or a gap in m?",
+        ),
+        (&["d,cut-in,108,80km/h,1,1,1.65,,,"], "line 2, column `length`: 1.65 m, but the width is 1.9 m"),
+        (&["d,cut-in,108,80km/h,1,1,,,1.65,"], "line 2, column `ego_length`: 1.65 m, but the width is 1.9 m"),
+        (
+            &["d,cut-in,108,80km/h,1,1,,3.75,,"],
+            "column `width`: 3.75 m is not plausible for a vehicle width (0.4 to 3.2 m)",
+        ),
+        (
+            &["d,cut-in,108,80km/h,1,3.6,,,,"],
+            "column `lateral_speed_mps`: 3.6 m/s is not plausible for a lateral speed of a lane change (0 to 3 m/s); 3.6 \
+             looks like km/h: 1 m/s",
+        ),
+        (&["d,cut-out,60,0,1,1,,,,30"], "column `lateral_speed_mps`: 1 m/s, but the vehicle drives at 0 m/s"),
+        (
+            &[good[0], good[1], good[2], "d,cut-in,60,60m/s,1,1,,,,"],
+            "t.csv, line 5, column `speed`: 60 m/s, but the others are up to 22.22 m/s: in km/h it is 16.67 m/s",
+        ),
+    ] {
+        for said in notes(dir, &table(rows)) {
+            assert!(said.contains(expected), "{expected}: {said}");
+        }
+    }
+    let [twice, _] = notes(dir, &table(&[good[0], good[1], &good[0].replace("a,", "z,")]));
+    assert!(
+        twice
+            .contains("1 row(s) are equal to another one but for their ids and count again, the first: row 3 is row 1"),
+        "{twice}"
+    );
+    // Headways of a flag have no ego.
+    file(dir, "t.csv", &table(&good));
+    let (_, text) = said(dir, "study --scenarios t.csv --models FSM --backend cpu --thw 1.2,12 --out out");
+    assert!(text.contains("--thw: 12 s is not plausible for a time headway") && !text.contains("1.2 s is"), "{text}");
+}
+
+#[test]
+fn an_end_speed_that_the_duration_cuts_off_and_a_table_of_another_kind_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let braking = |duration: &str| {
+        format!("category,ego_speed_kmh,gap,acceleration,end_speed_kmh,duration_s\nlvd,60,20,-6,20,{duration}\n")
+    };
+    let says = "column `end_speed_kmh`: 5.556 m/s is not reached: after 1 s the speed is 10.67 m/s";
+    file(dir, "t.csv", &braking("1"));
+    for verb in ["check t.csv", "simulate --table t.csv", "study --scenarios t.csv"] {
+        refused(dir, verb, 3, says);
+    }
+    // 40 km/h at 6 m/s² take 1.852 s; what is less than 0.1 km/h away is reached.
+    for duration in ["1.85", "2", ""] {
+        file(dir, "t.csv", &braking(duration));
+        assert!([0, 1, 8, 9, 10].contains(&said(dir, "check t.csv --nominal").0), "{duration}");
+    }
+    file(
+        dir,
+        "t.csv",
+        "id,category,time_s,ego_speed_mps,ego_length_m,ego_width_m,side,target_length_m,target_width_m,target_speed_mps\na,lvd,0,20,4,2,left,4,2,20\n",
+    );
+    refused(dir, "check t.csv", 3, "t.csv, line 1: this is a table of scenarios with series, not of cases");
+    file(dir, "t.csv", "frame,id,x,y,width,height\n1,1,10,8,4,2\n");
+    refused(dir, "check t.csv", 3, "t.csv, line 1: this is a table of tracks");
 }

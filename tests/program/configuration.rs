@@ -8,7 +8,7 @@ use std::process::{Command, Output};
 use lanesweep::cli::settings::{Key, KeyKind};
 use serde_json::Value;
 
-use crate::common::program::{PROGRAM, json, unbroken, words};
+use crate::common::program::{PROGRAM, json, said, unbroken, words};
 
 /// Runs the program with nothing configured but what the test configures.
 fn run(dir: &Path, variables: &[(&str, &str)], line: &str) -> Output {
@@ -233,6 +233,11 @@ fn the_default_file_is_written_once_and_sets_what_is_so_anyway() {
     assert_eq!(std::fs::read_to_string(dir.join("lanesweep.toml")).unwrap(), "[score]\nseed = 1\n");
     assert_eq!(good(dir, &[], "config check lanesweep.toml").lines().count(), 1);
     good(dir, &[], "config init new/other.toml");
+    assert!(good(dir, &[], "config init un-r157.toml").contains("--profile un-r157.toml"));
+    assert_eq!(
+        std::fs::read_to_string(dir.join("un-r157.toml")).unwrap(),
+        include_str!("../../configs/profiles/un-r157.toml")
+    );
     // What is shown as a file sets the same again.
     let toml = good(dir, &[], "config show --format toml --config mining.cut_in.max_thw_s=1.5 --threads 1");
     std::fs::write(dir.join("again.toml"), &toml).unwrap();
@@ -270,5 +275,62 @@ fn walk(schema: &Value, prefix: &str, each: &mut dyn FnMut(&str, &Value)) {
     for (name, property) in schema["properties"].as_object().into_iter().flatten() {
         let name = if prefix.is_empty() { name.clone() } else { format!("{prefix}.{name}") };
         if property["properties"].is_object() { walk(property, &name, each) } else { each(&name, property) }
+    }
+}
+
+/// Factors of ten and other units are reported, studies of unusual drivers run, and what no driver has is refused.
+#[test]
+fn a_profile_with_an_unusual_constant_is_used_and_reported() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let shipped = include_str!("../../configs/profiles/un-r157.toml").replace("name = \"un-r157\"", "name = \"own\"");
+    let check = |old: &str, new: &str| {
+        assert!(shipped.contains(old), "{old}");
+        std::fs::write(dir.join("own.toml"), shipped.replace(old, new)).unwrap();
+        let case = "--category cut-in --ego-speed 60km/h --speed 40km/h --gap 15 --lateral-speed 1";
+        said(dir, &format!("check {case} --profiles own.toml"))
+    };
+    for (old, new, expected) in [
+        (
+            "wandering_m = 0.375",
+            "wandering_m = 37.5",
+            Some("`cchdm.wandering_m`: 37.5 m is used as it is, usual is 0.01 to 10"),
+        ),
+        ("\ndelay_s = 0.75", "\ndelay_s = 0.06", Some("`cchdm.delay_s`: 0.06 s is used as it is, usual is 0.1 to 10")),
+        (
+            "jerk_mps3 = 12.65",
+            "jerk_mps3 = 1.29",
+            Some("`fsm.jerk_mps3`: 1.29 m/s³ is used as it is, usual is 2 to 1000"),
+        ),
+        ("reaction_time_s = 0.75", "reaction_time_s = 5.0", None),
+        ("reaction_time_s = 0.75", "reaction_time_s = 0.1", None),
+        ("lateral_acceleration_mps2 = 1.0", "lateral_acceleration_mps2 = 0.8", None),
+    ] {
+        let (code, text) = check(old, new);
+        assert!([0, 1, 8].contains(&code), "{code}: {text}");
+        match expected {
+            Some(expected) => assert!(text.contains(expected), "{expected}: {text}"),
+            None => assert!(!text.contains("usual"), "{text}"),
+        }
+    }
+    for (old, new, expected) in [
+        (
+            "reaction_time_s = 0.75",
+            "reaction_time_s = 75.0",
+            "`fsm.reaction_time_s`: 75 is not usable; expected 0, or 0.001 to 60 s",
+        ),
+        (
+            "btn_threshold = 0.8",
+            "btn_threshold = 80.0",
+            "`criteria.btn_threshold`: 80 is not usable; expected 0.001 to 10",
+        ),
+        (
+            "comfortable_deceleration_mps2 = 4.0",
+            "comfortable_deceleration_mps2 = 9.0",
+            "`fsm.comfortable_deceleration_mps2`: 9 is above `fsm.max_surrogate_deceleration_mps2`, 6",
+        ),
+    ] {
+        let (code, text) = check(old, new);
+        assert!(code == 2 && text.contains(expected), "{expected}: {code} {text}");
     }
 }

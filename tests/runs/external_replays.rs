@@ -42,6 +42,22 @@ fn s_prime_of_other_programs_and_of_bases_of_other_folds_are_scored() {
         said(dir.path(), &format!("{} {name} --categories cut-in --out ids", &study[3..])).1.contains("check the ids")
     };
     assert!(warned("moved.jsonl") && !warned("scenarios.jsonl"));
+    // Every second sample with the old rate, and the same with its own.
+    let thinned = |fps: f64| {
+        let every_second = |series: &mut serde_json::Value| {
+            let kept: Vec<_> = series.as_array().unwrap().iter().step_by(2).cloned().collect();
+            *series = kept.into();
+        };
+        let rows = cut_ins.iter().cloned().map(|mut row| {
+            row["fps"] = fps.into();
+            ["v", "y"].iter().for_each(|of| every_second(&mut row["target"][*of]));
+            format!("{row}\n")
+        });
+        std::fs::write(of("thinned.jsonl"), rows.collect::<String>()).unwrap();
+        said(dir.path(), &format!("{} thinned.jsonl --categories cut-in --out ids", &study[3..])).1
+    };
+    assert!(thinned(25.0).contains("thinned.jsonl: every S' (cut-in) lasts 0."), "{}", thinned(25.0));
+    assert!(!thinned(12.5).contains("thinned.jsonl: "), "{}", thinned(12.5));
     // What is wrong is said.
     let scenarios = read_scenario_file(&of("scenarios.jsonl"), Implausible::Refused).unwrap().scenarios;
     let id = &scenarios.iter().find(|s| s.kept && s.category == Category::CutIn).unwrap().id;

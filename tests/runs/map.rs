@@ -340,6 +340,27 @@ fn what_makes_no_map_is_answered_with_what_would() {
 
 /// What the sheet of one case says, the map says of its cell.
 #[test]
+fn sizes_that_no_vehicle_has_are_reported() {
+    let dir = tempfile::tempdir().unwrap();
+    let map = "map lvd --x gap_m=10,20 --y ego_speed_mps=10,20 --set deceleration_mps2=1 --out map";
+    for (set, expected) in [
+        ("--set width_m=3.5", "an implausible vehicle width is used as it is, once: width_m: 3.5 m"),
+        ("--set length_m=1.9 --set width_m=4", "an implausible vehicle width is used as it is, once: width_m: 4 m"),
+        ("--panel length_m=2,4", ""),
+        (
+            "--panel length_m=1.8,4",
+            "vehicle length is used as it is, 4 times, first: cell 0, length: 1.8 m, but the width is 1.9 m",
+        ),
+    ] {
+        let (code, text) = program::said(dir.path(), &format!("{map} {set}"));
+        assert!(
+            code == 0 && text.contains(expected) && (text.contains("implausible") != expected.is_empty()),
+            "{text}"
+        );
+    }
+}
+
+#[test]
 fn a_cell_is_undecided_where_the_single_case_is() {
     use lanesweep::run::check::{Check, RunEnd, Subject};
     let speeds = "other_speed_kmh=30 ego_speed_kmh=60";

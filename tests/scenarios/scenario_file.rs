@@ -73,21 +73,32 @@ fn refused_change(change: impl FnOnce(&mut Value)) -> String {
 
 #[test]
 fn what_a_scenario_says_twice_and_differently_is_named() {
-    let notes = |category, change: &dyn Fn(&mut Scenario)| {
-        let mut list: Vec<Scenario> = common::mined::scenarios_of(2).to_vec();
+    let mined = common::mined::scenarios_of(2);
+    let notes = |list: &[Scenario], category, change: &dyn Fn(&mut Scenario)| {
+        let mut list = list.to_vec();
         list.iter_mut().filter(|s| s.category == category).for_each(change);
         let written = tempfile::NamedTempFile::new().unwrap();
         write_scenarios(written.path(), &list).unwrap();
         read_scenario_file(written.path(), Implausible::Refused).unwrap().notes.join("\n")
     };
-    assert_eq!(notes(Category::CutIn, &|_| ()), "");
+    assert_eq!(notes(mined, Category::CutIn, &|_| ()), "");
     let slower = |s: &mut Scenario| s.target.v.iter_mut().for_each(|v| *v /= 3.6 * 3.6);
     let thinner = |s: &mut Scenario| {
         s.target.v = s.target.v.iter().copied().step_by(2).collect();
         s.target.y = s.target.y.iter().copied().step_by(2).collect();
     };
     type Change<'a> = &'a dyn Fn(&mut Scenario);
-    let cases: [(Category, Change, &str); 6] = [
+    // A digit of 0.1 m at 25 Hz is 2.5 m/s.
+    let rounded = |s: &mut Scenario| s.target.y.iter_mut().for_each(|y| *y = (*y * 10.0).round() / 10.0);
+    let lane_off = |s: &mut Scenario| s.target.y.iter_mut().for_each(|y| *y += s.lane_width);
+    let standing = |s: &mut Scenario| s.target.v.fill(0.0);
+    const AWAY: &str = "are never in the ego's lane";
+    let cases: [(Category, Change, &str); 11] = [
+        (Category::CutIn, &lane_off, AWAY),
+        (Category::CutOut, &lane_off, AWAY),
+        (Category::Lvd, &lane_off, AWAY),
+        (Category::CutIn, &rounded, "have a position or a speed that stands still between steps"),
+        (Category::CutOut, &standing, "have a vehicle that moves farther to the side than along the road"),
         (Category::Lvd, &slower, "have a `peak_decel` that the changes of `target.v` contradict"),
         (Category::Lvd, &|s| s.fps = 10.0, "have a `peak_decel` that the changes of `target.v` contradict"),
         (Category::Lvd, &thinner, "have not one sample per frame from `frame0` to `frame1`"),
@@ -96,8 +107,14 @@ fn what_a_scenario_says_twice_and_differently_is_named() {
         (Category::CutIn, &|s| s.target.y.iter_mut().for_each(|y| *y += 1.75), "are never in the ego's lane"),
     ];
     for (category, change, expected) in cases {
-        let said = notes(category, change);
+        let said = notes(mined, category, change);
         assert!(said.contains(expected), "{expected}: {said}");
+    }
+    // One scenario is enough where no other reading is possible.
+    for category in Category::ALL {
+        let one = common::mined::kept(mined, category)[0].clone();
+        let said = notes(&[one], category, &lane_off);
+        assert!(said.contains(AWAY), "{said}");
     }
 }
 

@@ -3,13 +3,12 @@
 use std::ops::{Index, IndexMut};
 
 use super::case_quantity::CaseQuantity::{self, Gap, Thw};
-use super::case_quantity::{CaseNumber, NUMBERS};
+use super::case_quantity::{CaseNumber, NUMBERS, SPEED_ERROR_MPS};
 use super::units::{self, Written};
 use super::{Category, LANE_WIDTH_M, PlainCase, check_headway};
-use crate::plausibility::{Doubts, HELP, Quantity};
-use crate::profile::FrameProfile;
+use crate::plausibility::{Doubts, HELP, NEAR_M, Quantity};
 use lanesweep_support::table::{NameUnit, Resolved, resolve};
-use lanesweep_support::{Error, Place, Result, option};
+use lanesweep_support::{Error, Place, Result, option, readable};
 
 /// The given values; speeds in m/s, lengths in m, accelerations in m/s², times in s. A quantity is its index:
 /// `parameters[CaseQuantity::Gap]`.
@@ -122,40 +121,36 @@ impl CaseParameters {
         Category::named(text, Place::item("category"))
     }
 
-    /// Sets speeds that are noise of a standing vehicle to 0 and counts them; `place` returns the place of a key.
-    pub(super) fn settle(&mut self, doubts: &mut Doubts, place: impl Fn(&str) -> String) {
-        for &CaseNumber { quantity, key, .. } in NUMBERS.iter().filter(|number| number.needs_unit()) {
-            self[quantity] = self[quantity].map(|v| doubts.speed(v, || place(key)));
-        }
-    }
-
-    /// Checks the plausibility of the given values.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] for a value outside the physical range, unless such values are accepted.
-    pub(crate) fn check_plausible(&self, doubts: &mut Doubts) -> Result<()> {
-        for &CaseNumber { key, plausible, quantity, .. } in &NUMBERS {
-            let (Some(plausible), Some(value)) = (plausible, self[quantity]) else { continue };
-            doubts
-                .check(plausible, value, || key.to_owned())
-                .map_err(|problem| Error::usage(Place::item(key), problem, HELP.as_str()))?;
-        }
-        Ok(())
-    }
-
-    /// Returns the case after all checks: vehicles without a given size have that of the frame. Speeds that are noise
-    /// are set to 0.
+    /// Returns the case after all checks: vehicles without a given size have that of the arguments, m. Speeds that are
+    /// noise are set to 0. `place` returns the place of a key.
     ///
     /// # Errors
     /// [`Error::Usage`] that names what is missing or out of range.
-    pub fn checked_case(&mut self, frame: &FrameProfile, doubts: &mut Doubts) -> Result<PlainCase> {
-        self.settle(doubts, str::to_owned);
-        let plain = self.plain_case(frame.default_length_m, frame.default_width_m)?;
-        self.check_plausible(doubts)?;
+    pub fn checked_case(
+        &mut self,
+        [length_m, width_m]: [f64; 2],
+        time_cap_s: f64,
+        doubts: &mut Doubts,
+        place: &dyn Fn(&str) -> String,
+    ) -> Result<PlainCase> {
+        for &CaseNumber { quantity, key, .. } in NUMBERS.iter().filter(|number| number.needs_unit()) {
+            self[quantity] = self[quantity].map(|v| doubts.speed(v, || place(key)));
+        }
+        let plain = self.plain_case(length_m, width_m)?;
+        for &CaseNumber { key, plausible, quantity, .. } in &NUMBERS {
+            let is_near = |value: f64| quantity == Thw && value * plain.ego_speed_mps <= NEAR_M;
+            let (Some(plausible), Some(value)) = (plausible, self[quantity].filter(|value| !is_near(*value))) else {
+                continue;
+            };
+            doubts
+                .check(plausible, value, || place(key))
+                .map_err(|problem| Error::usage(Place::item(key), problem, HELP.as_str()))?;
+        }
+        plain.check_plausible(doubts, place);
         // An acceleration without an end can reach extreme speeds within the time cap.
-        let last_mps = plain.last_speed_mps(frame.time_cap_s)?;
-        let is_plausible =
-            doubts.check(Quantity::Speed, last_mps, || "the speed that results from the acceleration".to_owned());
+        let last_mps = plain.last_speed_mps(time_cap_s)?;
+        let place = || format!("{}: the speed that results", place("acceleration"));
+        let is_plausible = doubts.check(Quantity::Speed, last_mps, place);
         is_plausible.map_err(|text| {
             let problem = format!("it results in a speed that no vehicle has: {text}");
             let help = format!("a deceleration is negative; an acceleration needs an end: {}", option("end_speed"));
@@ -191,7 +186,18 @@ impl CaseParameters {
         given().filter(|(number, _)| !is_foreign(number)).try_for_each(|(number, value)| number.check(value))?;
         self.check_start()?;
         let acceleration_mps2 = self[CaseQuantity::Deceleration].unwrap_or(0.0);
-        Ok(PlainCase { acceleration_mps2, ..PlainCase::of(category, &|quantity| self[quantity], length_m, width_m) })
+        let plain =
+            PlainCase { acceleration_mps2, ..PlainCase::of(category, &|quantity| self[quantity], length_m, width_m) };
+        if let Some((end_mps, duration_s)) = plain.end_speed_mps.zip(plain.duration_s) {
+            let last_mps = plain.speed_mps + acceleration_mps2 * duration_s;
+            if (end_mps - last_mps) * acceleration_mps2.signum() > SPEED_ERROR_MPS {
+                let [last, end] = [last_mps, end_mps].map(readable::value);
+                let problem = format!("{end} m/s is not reached: after {duration_s} s the speed is {last} m/s");
+                let help = "give a longer duration, another acceleration, or no end speed";
+                return Err(Error::usage(Place::item("end_speed"), problem, help));
+            }
+        }
+        Ok(plain)
     }
 
     /// Checks the initial distance, if given.
@@ -233,6 +239,20 @@ impl PlainCase {
             ego_width_m: value(CaseQuantity::EgoWidth, width_m),
             lane_width_m,
             duration_s: get(CaseQuantity::Duration),
+        }
+    }
+
+    /// Counts values that contradict one another; `place` returns the place of a key.
+    pub fn check_plausible(&self, doubts: &mut Doubts, place: &dyn Fn(&str) -> String) {
+        let (others, ego) = ((self.length_m, self.width_m), (self.ego_length_m, self.ego_width_m));
+        doubts.check_shape(others.0, others.1, || place("length"));
+        if ego != others {
+            doubts.check_shape(ego.0, ego.1, || place("ego_length"));
+        }
+        if self.category != Category::Lvd && self.lateral_speed_mps > self.speed_mps {
+            let [lateral, along] = [self.lateral_speed_mps, self.speed_mps].map(readable::value);
+            let text = format!("{}: {lateral} m/s, but the vehicle drives at {along} m/s", place("lateral_speed"));
+            doubts.contradict(Quantity::LaneChangeSpeed, text);
         }
     }
 }

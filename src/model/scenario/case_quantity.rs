@@ -131,7 +131,7 @@ pub static NUMBERS: [CaseNumber; 16] = [
     number!(Thw thw, "Initial time headway instead of the gap", "Initial time headway",
         [("thw_s", "s", 1.0)] (0.0, 100.0), Some(Quantity::Headway), EVERY, (none)),
     number!(LateralSpeed lateral_speed, "Cut-in, cut-out: lateral speed", "Lateral speed",
-        [("lateral_speed_mps", "m/s", 1.0)] (0.0, 20.0), Some(Quantity::LateralSpeed), LANE_CHANGES,
+        [("lateral_speed_mps", "m/s", 1.0)] (0.0, 20.0), Some(Quantity::LaneChangeSpeed), LANE_CHANGES,
         ("lateral speed", LATERAL_SPEED_ERROR_MPS, "0.01 m/s")),
     number!(LateralDistance lateral_distance, "Cut-in: lateral distance at the start; cut-out: at the end [default: the lane's width]",
         "Lateral distance of the lane change",

@@ -1,7 +1,7 @@
 //! Checks that types cannot express: lengths, signs, what a category needs, and what is plausible on a road.
 
 use super::{Category, Other, Scenario};
-use crate::plausibility::{Doubts, HELP, Quantity};
+use crate::plausibility::{Doubts, HELP, NEAR_M, Quantity};
 use lanesweep_support::error::{Error, Place, Result};
 
 /// Refuses a scenario that could not be read back: JSON writes NaN as null, for instance. A recording may hold speeds
@@ -36,11 +36,8 @@ pub(super) fn check(scenario: &Scenario) -> std::result::Result<(), Problem> {
     let s = scenario;
     for (field, text) in [("id", &s.id), ("recording", &s.recording)] {
         if text.len() > MAX_ID_BYTES {
-            return Err(Problem {
-                field: field.into(),
-                problem: format!("has {} bytes; expected at most {MAX_ID_BYTES}", text.len()),
-                help: "give it a shorter name",
-            });
+            let problem = format!("has {} bytes; expected at most {MAX_ID_BYTES}", text.len());
+            return Err(Problem { field: field.into(), problem, help: "give it a shorter name" });
         }
     }
     expect((MIN_RATE_HZ..=MAX_MAGNITUDE).contains(&s.fps), "fps", s.fps, "a number of at least 0.1 and at most 1e6")?;
@@ -50,11 +47,9 @@ pub(super) fn check(scenario: &Scenario) -> std::result::Result<(), Problem> {
     Bound::AboveZero.check("ego.width", s.ego.width)?;
     let samples = s.target.v.len();
     if samples < 2 {
-        return Err(Problem {
-            field: "target.v".into(),
-            problem: format!("{samples} samples, but a scenario needs at least 2"),
-            help: "remove the scenario or export its whole series",
-        });
+        let problem = format!("{samples} samples, but a scenario needs at least 2");
+        let help = "remove the scenario or export its whole series";
+        return Err(Problem { field: "target.v".into(), problem, help });
     }
     check_other("target", &s.target, samples)?;
     if let Some(lead) = &s.lead {
@@ -68,11 +63,9 @@ pub(super) fn check(scenario: &Scenario) -> std::result::Result<(), Problem> {
         expect(!is_ahead || value >= 0.0, field, value, what)?;
     }
     if s.category == Category::CutOut && s.kept && (s.lead.is_none() || s.lead_gap.is_none()) {
-        return Err(Problem {
-            field: if s.lead.is_none() { "lead" } else { "D" }.into(),
-            problem: "absent, but a kept cut-out needs a vehicle ahead".into(),
-            help: "give the vehicle ahead (`lead`) and the gap to it (`D`), or set `kept` to false",
-        });
+        let field = if s.lead.is_none() { "lead" } else { "D" }.into();
+        let help = "give the vehicle ahead (`lead`) and the gap to it (`D`), or set `kept` to false";
+        return Err(Problem { field, problem: "absent, but a kept cut-out needs a vehicle ahead".into(), help });
     }
     Ok(())
 }
@@ -82,11 +75,9 @@ fn check_other(role: &str, other: &Other, samples: usize) -> std::result::Result
     Bound::AboveZero.check(&format!("{role}.width"), other.width)?;
     for (field, series) in [("v", &other.v), ("y", &other.y)] {
         if series.len() != samples {
-            return Err(Problem {
-                field: format!("{role}.{field}"),
-                problem: format!("{} samples, but `target.v` has {samples}", series.len()),
-                help: "all series of a scenario cover the same samples, frame0 to frame1",
-            });
+            let problem = format!("{} samples, but `target.v` has {samples}", series.len());
+            let help = "all series of a scenario cover the same samples, frame0 to frame1";
+            return Err(Problem { field: format!("{role}.{field}"), problem, help });
         }
     }
     for (k, &v) in other.v.iter().enumerate() {
@@ -148,11 +139,8 @@ fn expect(holds: bool, field: &str, value: f64, what: &str) -> std::result::Resu
     if holds {
         return Ok(());
     }
-    Err(Problem {
-        field: field.into(),
-        problem: format!("is {value}; expected {what}"),
-        help: "correct the value or remove the scenario",
-    })
+    let problem = format!("is {value}; expected {what}");
+    Err(Problem { field: field.into(), problem, help: "correct the value or remove the scenario" })
 }
 
 /// Admits a scenario that was read: sets noise of standing vehicles to 0, refuses errors, and counts implausible
@@ -170,7 +158,7 @@ pub(super) fn admit(
     }
     check(scenario)?;
     let s = &*scenario;
-    let mut check_plausible = |quantity, field: &str, value, prefix: &str| {
+    let check_plausible = |doubts: &mut Doubts, quantity, field: &str, value, prefix: &str| {
         let checked = doubts.check(quantity, value, || place(field));
         checked.map_err(|text| Problem {
             field: field.to_owned(),
@@ -182,22 +170,26 @@ pub(super) fn admit(
         (Quantity::Rate, "fps", Some(s.fps)),
         (Quantity::LaneWidth, "lane_width", Some(s.lane_width)),
         (Quantity::Speed, "ego.v0", Some(s.ego.v0)),
-        (Quantity::Length, "ego.length", Some(s.ego.length)),
-        (Quantity::Width, "ego.width", Some(s.ego.width)),
         (Quantity::Gap, "gap0", s.gap0),
         (Quantity::Gap, "D", s.lead_gap),
-        (Quantity::Headway, "thw0", s.thw0),
+        (Quantity::Headway, "thw0", s.thw0.filter(|thw_s| (thw_s * s.ego.v0).abs() > NEAR_M)),
     ];
     for (quantity, field, value) in numbers {
-        value.map_or(Ok(()), |value| check_plausible(quantity, field, value, ""))?;
+        value.map_or(Ok(()), |value| check_plausible(doubts, quantity, field, value, ""))?;
     }
-    for (role, other) in [("target", Some(&s.target)), ("lead", s.lead.as_ref())] {
-        let Some(other) = other else { continue };
-        check_plausible(Quantity::Length, &format!("{role}.length"), other.length, "")?;
-        check_plausible(Quantity::Width, &format!("{role}.width"), other.width, "")?;
+    let others = [("target", Some(&s.target)), ("lead", s.lead.as_ref())];
+    let others = others.into_iter().filter_map(|(role, other)| Some((role, other?)));
+    let sizes = others.clone().map(|(role, other)| (role, other.length, other.width));
+    for (role, length_m, width_m) in sizes.chain([("ego", s.ego.length, s.ego.width)]) {
+        let [length, width] = ["length", "width"].map(|of| format!("{role}.{of}"));
+        check_plausible(doubts, Quantity::Length, &length, length_m, "")?;
+        check_plausible(doubts, Quantity::Width, &width, width_m, "")?;
+        doubts.check_shape(length_m, width_m, || place(&length));
+    }
+    for (role, other) in others {
         let mut worst = |quantity, series: &str, values: &mut dyn Iterator<Item = f64>, prefix: &str| {
             let Some((k, value)) = farthest(quantity, values) else { return Ok(()) };
-            check_plausible(quantity, &format!("{role}.{series}[{k}]"), value, prefix)
+            check_plausible(doubts, quantity, &format!("{role}.{series}[{k}]"), value, prefix)
         };
         worst(Quantity::Speed, "v", &mut other.v.iter().copied(), "")?;
         worst(Quantity::LateralPosition, "y", &mut other.y.iter().copied(), "")?;

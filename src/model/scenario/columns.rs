@@ -187,35 +187,26 @@ fn exactly(number: f64) -> Option<i64> {
 }
 
 fn yes_or_no(value: Value) -> Value {
-    let known = match &value {
-        Value::String(text) => match text.to_ascii_lowercase().as_str() {
-            "true" | "yes" | "1" => Some(true),
-            "false" | "no" | "0" => Some(false),
-            _ => None,
-        },
-        Value::Number(number) => match number.as_f64() {
-            Some(1.0) => Some(true),
-            Some(0.0) => Some(false),
-            _ => None,
-        },
-        _ => None,
-    };
-    known.map_or(value, Value::from)
+    match value.as_str().map_or_else(|| value.to_string(), str::to_ascii_lowercase).as_str() {
+        "true" | "yes" | "1" | "1.0" => Value::from(true),
+        "false" | "no" | "0" | "0.0" => Value::from(false),
+        _ => value,
+    }
 }
 
-/// Where the columns are documented for users.
-pub(super) const HELP: &str = "the chapter on tables lists the columns (docs/src/tables.md)";
+/// What the columns of a table are.
+pub const HELP: &str = "cases have the flags of `simulate --help` with `_`, scenarios the columns that `mine` writes; the book's chapter on tables lists both";
 
 /// Maps the columns of a table to fields and selects the known ones.
 ///
 /// # Errors
 /// [`Error::Input`] for a column in an unusable unit, for two columns of one field, and for an unknown name close to
-/// that of a missing field, and for a table of lanes if it is refused.
+/// that of a missing field, and for a table of lanes or of series if it is refused.
 pub(super) fn choose(
     table: &mut TableReader,
     known: &[Named],
     field_of: impl Fn(usize) -> usize,
-    takes_lanes: bool,
+    takes_series: bool,
 ) -> Result<Vec<Chosen>> {
     let mut chosen: Vec<Chosen> = Vec::new();
     let mut unknown = Vec::new();
@@ -236,11 +227,19 @@ pub(super) fn choose(
             Resolved::Unknown => unknown.push(column),
         }
     }
-    // A lane has a verdict per criterion; a scenario does not.
-    let is_lane_table = ["collision", "ttc"].iter().all(|name| unknown.iter().any(|column| column == name));
-    if is_lane_table && !takes_lanes {
-        let help = "give a scenario file, such as `lanesweep mine` writes";
-        return Err(Error::input(table.header(), "this is a table of lanes, not of scenarios", help));
+    // A lane has a verdict per criterion, a scenario has series of a target; a case has neither.
+    let has = |name: &&str| unknown.iter().any(|column| column.replace('.', "_").starts_with(name));
+    let (lanes, series) = (["collision", "ttc"], ["target_v", "target_y", "target_speed", "target_lateral"]);
+    let wrong = match (takes_series, lanes.iter().all(has), series.iter().any(has)) {
+        (false, true, _) => Some(("lanes, not of scenarios", "give a scenario file, such as `lanesweep mine` writes")),
+        (false, _, true) => Some((
+            "scenarios with series, not of cases",
+            "give it to `study --scenarios`, or name one of its scenarios (`check FILE --scenario ID`)",
+        )),
+        _ => None,
+    };
+    if let Some((kind, help)) = wrong {
+        return Err(Error::input(table.header(), format!("this is a table of {kind}"), help));
     }
     let mut unused = Vec::new();
     for column in unknown {

@@ -145,7 +145,7 @@ fn read_json_lines(path: &Path, implausible: Implausible) -> Result<ScenarioFile
         match serde_json::from_str::<Scenario>(text).or_else(|error| of_flat(text).ok_or(error)) {
             Ok(scenario) => {
                 let place = place.of(name(&scenario.id));
-                found.take(scenario, row, "line", |field| place.clone().column(field));
+                found.take(scenario, None, row, "line", |field| place.clone().column(field));
             }
             Err(error) => found.refuse(explain(&place, text, &error)),
         }

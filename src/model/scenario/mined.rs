@@ -13,10 +13,11 @@ use crate::category::Category;
 use lanesweep_support::{Error, Place, Result, option};
 
 /// Side of the ego's lane, in the direction of travel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Side {
     /// Left, `d > 0`.
+    #[default]
     Left,
     /// Right, `d < 0`.
     Right,
@@ -33,7 +34,7 @@ impl Side {
 }
 
 /// The ego at the start of a scenario.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Default, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Ego {
     /// Initial speed, m/s, ≥ 0.
     pub v0: f64,
@@ -44,7 +45,7 @@ pub struct Ego {
 }
 
 /// Another vehicle over the whole scenario.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Default, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Other {
     /// Length, m, > 0.
     pub length: f64,
@@ -62,7 +63,7 @@ pub fn mined_id(recording: &str, category: Category, ego: &dyn Display, target: 
 }
 
 /// One mined scenario. Unknown fields of a file are ignored; optional ones may be absent.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Default, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Scenario {
     /// Stable key: [`mined_id`].
     pub id: String,

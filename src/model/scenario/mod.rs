@@ -26,6 +26,7 @@ pub use case_file::CaseFile;
 pub use case_parameters::{CaseParameters, NamedNumber};
 pub use case_quantity::{CaseNumber, CaseQuantity, GAP_ERROR_M, KMH, MeasurementError, NUMBERS, SPEED_ERROR_MPS};
 pub use check::problem_of;
+pub use columns::HELP as COLUMNS_HELP;
 pub use file::{check_scenario_file, read_scenario_file, read_scenarios, write_scenarios, write_scenarios_to};
 pub use found::{ScenarioFile, usable};
 pub use mined::{Ego, Other, Scenario, Side, mined_id};

@@ -4,14 +4,16 @@
 use serde_json::Value;
 
 use super::case_parameters::{CaseParameters, NamedNumber};
-use super::case_quantity::{CaseNumber, CaseQuantity, NUMBERS};
+use super::case_quantity::{CaseNumber, CaseQuantity, KMH, NUMBERS};
 use super::check::{DURATIONS_S, name};
 use super::columns::{Chosen, HELP, choose};
 use super::found::{ScenarioFile, ScenariosRead};
+use super::table_reader::refuse_tracks;
 use super::units::{Written, si};
-use super::{Category, Ego, Lateral, Other, PlainCase, Scenario, Side, Speed};
-use crate::plausibility::{Doubts, Implausible};
+use super::{Category, Ego, Lateral, Other, PlainCase, Scenario, Speed};
+use crate::plausibility::{Doubts, HELP as IMPLAUSIBLE, Implausible, Quantity};
 use lanesweep_support::error::{Error, Place, Result};
+use lanesweep_support::readable;
 use lanesweep_support::table::{Named, Row, TableReader};
 
 /// Columns that are texts; those of the numbers of a case follow, then [`RATE`].
@@ -65,14 +67,36 @@ type NumberedRow = (u64, Result<CaseRow>);
 pub struct ParameterRows {
     table: TableReader,
     chosen: Vec<Chosen>,
+    /// Speeds so far, by [`CaseQuantity`].
+    speeds: [Speeds; NUMBERS.len()],
 }
+
+/// Speeds of a column: minimum, second largest, and maximum with its row, m/s.
+type Speeds = (f64, f64, f64, u64);
+
+/// Speed from which a single one of a column is compared with the others, m/s: 180 km/h.
+const MIN_ODD_MPS: f64 = 50.0;
 
 impl ParameterRows {
     /// # Errors
     /// As `choose`, for every unknown column.
     pub fn new(mut table: TableReader) -> Result<ParameterRows> {
+        refuse_tracks(&table)?;
         let chosen = choose(&mut table, &columns(), |at| at, false)?;
-        Ok(ParameterRows { table, chosen })
+        Ok(ParameterRows { table, chosen, speeds: [(f64::INFINITY, 0.0, 0.0, 0); NUMBERS.len()] })
+    }
+
+    /// Warnings about the columns of the rows so far.
+    pub fn notes(&self) -> Vec<String> {
+        let sentence = |(number, &(min, second, max, row)): (&CaseNumber, &Speeds)| {
+            // The others are like it in km/h, and it exceeds them all by half.
+            let is_odd = max >= MIN_ODD_MPS && max > 1.5 * second && (min..=second).contains(&(max / KMH));
+            let (place, [max, second, other]) =
+                (self.row_place(row).of(number.key), [max, second, max / KMH].map(readable::value));
+            let text = format!("{place}: {max} m/s, but the others are up to {second} m/s: in km/h it is {other} m/s");
+            (is_odd && number.needs_unit()).then_some(text)
+        };
+        NUMBERS.iter().zip(&self.speeds).filter_map(sentence).collect()
     }
 
     /// Returns the next row or its error; empty fields are skipped. A row with too many or too few fields is one error,
@@ -92,10 +116,17 @@ impl ParameterRows {
         }
     }
 
-    fn typed(&self, Row { number: row, values }: Row) -> Result<CaseRow> {
+    fn typed(&mut self, Row { number: row, values }: Row) -> Result<CaseRow> {
         let mut case = CaseRow::default();
         for (column, value) in self.chosen.iter().zip(values).filter(|(_, value)| !value.is_null()) {
             case.set(column, &value).map_err(|error| self.row_place(row).locate(error))?;
+        }
+        for ((min, second, max, at), mps) in self.speeds.iter_mut().zip(case.parameters.numbers) {
+            let Some(mps) = mps else { continue };
+            (*min, *second) = (min.min(mps), second.max(mps.min(*max)));
+            if mps > *max {
+                (*max, *at) = (mps, row);
+            }
         }
         Ok(case)
     }
@@ -168,7 +199,10 @@ pub struct RowPlace {
 
 impl RowPlace {
     /// The place of a value.
-    fn of(&self, key: &str) -> Place {
+    pub fn of(&self, key: &str) -> Place {
+        if self.replaced.contains(&key) {
+            return Place::item(key);
+        }
         let column = self.columns.iter().find(|(known, _)| *known == key).map_or(key, |(_, column)| column);
         self.row.clone().column(column)
     }
@@ -215,7 +249,7 @@ pub(super) fn read(table: TableReader, implausible: Implausible) -> Result<Scena
             let help = "give shorter scenarios (`duration_s`) or a lower `rate_hz`, or make several tables";
             return Err(Error::input(rows.table.place(row, None).column("duration_s"), problem, help));
         }
-        let mut doubts = found.doubts();
+        let mut doubts = found.doubts.another();
         let at = rows.row_place(row);
         let place = |key: &str| at.of(key).to_string();
         let scenario = case.and_then(|case| {
@@ -224,13 +258,15 @@ pub(super) fn read(table: TableReader, implausible: Implausible) -> Result<Scena
         match scenario {
             Err(error) => found.refuse(error),
             Ok(scenario) => {
-                found.add_doubts(doubts);
                 let item = name(&scenario.id);
-                found.take(scenario, row, rows.table.word(), |field| at.of_scenario(key_of(field), &item));
+                let place = |field: &str| at.of_scenario(key_of(field), &item);
+                found.take(scenario, Some(doubts), row, rows.table.word(), place);
             }
         }
     }
-    found.finish(header, HELP)
+    let mut file = found.finish(header, HELP)?;
+    file.notes.extend(rows.notes());
+    Ok(file)
 }
 
 /// The column that a field of the scenario comes from.
@@ -258,10 +294,11 @@ fn of_row(
     doubts: &mut Doubts,
     place: &dyn Fn(&str) -> String,
 ) -> Result<Scenario> {
-    parameters.settle(doubts, place);
-    let plain = parameters.plain_case(LENGTH_M, WIDTH_M)?;
+    let plain = parameters.checked_case([LENGTH_M, WIDTH_M], DURATIONS_S.1, doubts, place)?;
     let case = plain.case(DURATIONS_S.1)?;
     let rate_hz = rate_hz.unwrap_or(RATE_HZ);
+    let is_rate = doubts.check(Quantity::Rate, rate_hz, || place(RATE));
+    is_rate.map_err(|problem| Error::usage(Place::item(RATE), problem, IMPLAUSIBLE.as_str()))?;
     let duration_s = plain.duration_s.unwrap_or(case.horizon_s.max(MIN_DEFAULT_DURATION_S));
     let (gap0, thw0) = (parameters[CaseQuantity::Gap], parameters[CaseQuantity::Thw]);
     let of_headway = thw0.map(|thw_s| thw_s * plain.ego_speed_mps);
@@ -284,30 +321,18 @@ fn of_row(
     Ok(Scenario {
         id: id.unwrap_or_else(|| format!("row-{row}")),
         category,
-        recording: String::new(),
-        ego_id: 0,
-        target_id: 0,
-        lead_id: None,
-        frame0: 0,
         frame1: times_s.len() as i64 - 1,
         fps: rate_hz,
         kept: true,
         reason: "parameters".to_owned(),
         ego: Ego { v0: ego_speed_mps, length: plain.ego_length_m, width: plain.ego_width_m },
         lane_width: plain.lane_width_m,
-        side: Side::Left,
         target,
         lead,
         thw0,
         gap0,
         lead_gap: (category == Category::CutOut).then_some(plain.ahead_gap_m),
-        peak_decel: None,
-        truncated_start: None,
-        end_cause: None,
-        frame_switch: None,
-        tag_frames: None,
-        synthetic: false,
-        replays: Vec::new(),
+        ..Scenario::default()
     })
 }
 

@@ -2,7 +2,6 @@
 //! and instant, or one row per concrete case ([`super::parameter_table`]). The columns determine which. A table of
 //! tracks is recognised and refused, because recordings must be mined first.
 
-use std::io::Read;
 use std::path::Path;
 
 use serde_json::{Map, Value};
@@ -14,7 +13,6 @@ use super::schema::wrong_field;
 use super::{Scenario, parameter_table};
 use crate::plausibility::Implausible;
 use lanesweep_support::error::{Error, Place, Result};
-use lanesweep_support::input_file;
 use lanesweep_support::table::{Named, Resolved, Row, TableFormat, TableReader, resolve};
 
 /// Reads a table of scenarios.
@@ -22,8 +20,8 @@ use lanesweep_support::table::{Named, Resolved, Row, TableFormat, TableReader, r
 /// # Errors
 /// [`Error::Io`]; [`Error::Input`] naming file, row, scenario and column.
 pub(super) fn read(path: &Path, format: TableFormat, implausible: Implausible) -> Result<ScenarioFile> {
-    let table = TableReader::open(path, format).map_err(|error| of_unreadable_tracks(path, error))?;
-    refuse_tracks(table.columns(), table.header())?;
+    let table = TableReader::open(path, format)?;
+    refuse_tracks(&table)?;
     let leaves = leaves();
     let names = names(&leaves);
     let known: Vec<Named> = names.iter().map(|(named, ..)| named.clone()).collect();
@@ -184,11 +182,10 @@ impl Reader {
                 Some(leaf) if leaf.is_series() => open.series[at].push(value),
                 Some(_) if !self.may_change[at] && !value.is_null() && value != open.first[at] => {
                     let problem = format!("is {value}, but {} at the scenario's first instant", open.first[at]);
-                    return Err(Error::input(
-                        self.table.place(row, item).column(&column.column),
-                        problem,
-                        "a value of a whole scenario must be equal in all its rows, or given in the first row only",
-                    ));
+                    let place = self.table.place(row, item).column(&column.column);
+                    let help =
+                        "a value of a whole scenario must be equal in all its rows, or given in the first row only";
+                    return Err(Error::input(place, problem, help));
                 }
                 _ => {}
             }
@@ -247,7 +244,7 @@ impl Reader {
             return self.found.refuse(Error::input(place(&field), problem, HELP));
         }
         match serde_json::from_value::<Scenario>(value) {
-            Ok(scenario) => self.found.take(scenario, row, table.word(), place),
+            Ok(scenario) => self.found.take(scenario, None, row, table.word(), place),
             Err(e) => {
                 let problem = format!("not a scenario: {e}");
                 self.found.refuse(Error::input(table.place(row, item.clone()), problem, HELP));
@@ -304,37 +301,23 @@ fn odd_instant(times_s: &[f64]) -> (usize, f64) {
 }
 
 /// Column names of recordings, in lower case without punctuation: vehicle, instant, longitudinal and lateral position.
-const VEHICLE: &[&str] = &["id", "trackid", "vehicleid", "carid", "objectid", "idx"];
-const INSTANT: &[&str] = &[
-    "frame",
-    "frameid",
-    "framenum",
-    "frameindex",
-    "time",
-    "times",
-    "timesteptime",
-    "timestep",
-    "totalnanos",
-    "timestamp",
-];
-const ALONG: &[&str] = &["x", "xm", "xcenter", "vehiclex", "localx", "posx", "xloc", "xlockf", "carcenterx"];
-const ACROSS: &[&str] = &["y", "ym", "ycenter", "vehicley", "localy", "posy", "yloc", "ylockf", "carcentery"];
+const VEHICLE: &str = "id trackid vehicleid carid objectid idx";
+const INSTANT: &str = "frame frameid framenum frameindex time times timesteptime timestep totalnanos timestamp";
+const ALONG: &str = "x xm xcenter vehiclex localx posx xloc xlockf carcenterx";
+const ACROSS: &str = "y ym ycenter vehicley localy posy yloc ylockf carcentery";
 /// Columns that a table of scenarios has and a recording does not.
-const SCENARIO: &[&str] = &["category", "targetv", "targetvmps", "targety", "targetym"];
+const SCENARIO: &str = "category targetv targetvmps targety targetym";
 
-const TRACKS_HELP: &str = "scenarios are mined from recordings: give the folder of the recording as data, or mine it first (`mine`) and \
-                    give the scenarios that it writes. Recordings are read in highD's three files; convert others to these";
-
-/// Bytes of a file in which its header must end.
-const HEADER_BYTES: u64 = 1 << 16;
+const TRACKS_HELP: &str = "scenarios are mined from recordings: give the folder of the recording, or its file, as data, or mine it first \
+                           (`mine`) and give the scenarios that it writes; `tracks` says how it is read";
 
 /// Refuses the columns of a recording.
 ///
 /// # Errors
-/// [`Error::Input`] at `header`, naming the columns typical of recordings.
-fn refuse_tracks(columns: &[String], header: Place) -> Result<()> {
+/// [`Error::Input`] at the header, naming the columns typical of recordings.
+pub(super) fn refuse_tracks(table: &TableReader) -> Result<()> {
     let plain = |name: &str| name.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_ascii_lowercase();
-    let find = |known: &[&str]| columns.iter().find(|column| known.contains(&plain(column).as_str()));
+    let find = |known: &str| table.columns().iter().find(|column| known.split(' ').any(|name| name == plain(column)));
     let (Some(vehicle), Some(instant), Some(along), Some(across), None) =
         (find(VEHICLE), find(INSTANT), find(ALONG), find(ACROSS), find(SCENARIO))
     else {
@@ -344,21 +327,7 @@ fn refuse_tracks(columns: &[String], header: Place) -> Result<()> {
         "this is a table of tracks, not of scenarios: it has a vehicle (`{vehicle}`), its instants (`{instant}`) and its places \
          (`{along}`, `{across}`)"
     );
-    Err(Error::input(header, problem, TRACKS_HELP))
-}
-
-/// The error for a table that cannot be read. If its first line looks like a recording, the error says so; some
-/// simulators separate columns by semicolons.
-fn of_unreadable_tracks(path: &Path, error: Error) -> Error {
-    let mut head = Vec::new();
-    let is_read = input_file::open(path).is_ok_and(|file| file.take(HEADER_BYTES).read_to_end(&mut head).is_ok());
-    let text = String::from_utf8_lossy(&head);
-    let line = text.lines().next().unwrap_or_default().trim_start_matches('\u{feff}');
-    let columns: Vec<String> = line.split([';', '\t', ',']).map(|name| name.trim().to_owned()).collect();
-    match refuse_tracks(&columns, Place::file(path).row(1)) {
-        Err(tracks) if is_read => tracks,
-        _ => error,
-    }
+    Err(Error::input(table.header(), problem, TRACKS_HELP))
 }
 
 #[cfg(test)]

@@ -65,20 +65,24 @@ fn value(category: Category, text: &str) -> Result<(&'static MapParameter, f64)>
     }
 }
 
-impl GridParts {
-    /// Checks the plausibility of every value and collects implausible ones.
+impl Grid {
+    /// Checks the plausibility of every value and cell, and collects implausible ones.
     ///
     /// # Errors
     /// [`Error::Usage`] for a physically impossible value, unless such values are accepted.
-    pub fn check_plausible(&self, doubts: &mut Doubts) -> Result<()> {
+    pub fn check_plausible(&self, profile: &Profile, doubts: &mut Doubts) -> Result<()> {
         for axis in [&self.x, &self.y].into_iter().chain(&self.panel_axes) {
             axis.values.iter().try_for_each(|value| axis.parameter.check_plausible(*value, doubts))?;
         }
-        self.fixed.iter().try_for_each(|(parameter, value)| parameter.check_plausible(*value, doubts))
+        self.fixed.iter().try_for_each(|(parameter, value)| parameter.check_plausible(*value, doubts))?;
+        for cell in 0..self.cell_count() {
+            // A cell that is no case is refused later.
+            let Ok(case) = self.point(cell).plain_case(self.category, profile) else { continue };
+            case.check_plausible(doubts, &|key| format!("cell {cell}, {key}"));
+        }
+        Ok(())
     }
-}
 
-impl Grid {
     /// Phrases such as `initial time headway 2 s`: the fixed values, then defaults of parameters that the grid does not
     /// set.
     pub fn held(&self, profile: &Profile) -> Vec<String> {

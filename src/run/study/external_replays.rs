@@ -11,8 +11,8 @@ use lanesweep_model::plausibility::Implausible;
 use lanesweep_model::scenario::parameterization::{
     Parameterization, ParameterizationOptions, ReducedScenario, Reduction,
 };
-use lanesweep_model::scenario::{Category, Scenario, ScenarioFile, read_scenario_file};
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_model::scenario::{Category, Scenario, ScenarioFile, read_scenario_file, usable};
+use lanesweep_support::{Error, Place, Result, readable};
 
 /// S' of the scenarios of a category, by their ids.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,6 +42,10 @@ impl ExternalReplay {
         if !problems.is_empty() {
             return Err(problems.swap_remove(0));
         }
+        // An S' does not use these, so that they cannot contradict its series.
+        let used = |s| Scenario { frame0: 0, frame1: 0, gap0: None, thw0: None, peak_decel: None, ..s };
+        let ScenarioFile { scenarios: given, notes, .. } = usable(given.into_iter().map(used).collect(), implausible);
+        notes.iter().for_each(|note| tracing::warn!("{}: {note}", path.display()));
         let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
         // Keys of lanes and names of files have letters, digits, - and _.
         let key = stem.replace(|c: char| !(c.is_ascii_alphanumeric() || c == '-' || c == '_'), "-");
@@ -104,8 +108,18 @@ impl ExternalReplay {
             let problem = format!("scenario {} is missing; others of its category are there", missing.id);
             return Err(Error::input(Place::file(path), problem, "give all kept scenarios of a category, or none"));
         }
-        // Rows that were shifted or sorted have the ids of other scenarios.
         let pairs: Vec<_> = scenarios.iter().filter_map(|s| Some((s, self.scenarios.get(&s.id)?))).collect();
+        // Left-out samples shorten every S' by one factor.
+        let mut times: Vec<f64> = pairs.iter().map(|(s, own)| own.duration_s / s.duration_s()).collect();
+        times.sort_by(f64::total_cmp);
+        if let [least, .., most] = times[..]
+            && !(0.8..=1.25).contains(&least)
+            && most < 1.1 * least
+        {
+            let (file, times, category) = (path.display(), readable::value(least), self.category.label());
+            tracing::warn!("{file}: every S' ({category}) lasts {times} times as long as its scenario: check `fps`");
+        }
+        // Rows that were shifted or sorted have the ids of other scenarios.
         let difference = |(s, own): (&Scenario, &ReducedScenario)| {
             let ends = [(s.target.v.first(), own.v.first()), (s.target.v.last(), own.v.last())];
             ends.iter().map(|(a, b)| (a.unwrap_or(&0.0) - b.unwrap_or(&0.0)).abs()).sum::<f64>()

@@ -207,27 +207,18 @@ impl FoundScenario<'_> {
             recording: recording.clone(),
             ego_id: ego.id,
             target_id: self.target.id,
-            lead_id: None,
             frame0,
             frame1: self.frame(self.end),
             fps: recording_tags.recording.frame_rate_hz,
-            kept: false,
-            reason: String::new(),
             ego: Ego { v0, length: ego.length_m, width: ego.width_m },
             lane_width: micrometres(lane.width_m()),
             side,
             target: self.other(self.target, side)?,
-            lead: None,
             thw0: (v0 > 0.0).then(|| gap0 / v0),
             gap0: Some(gap0),
-            lead_gap: None,
             peak_decel: Some(peak_deceleration(&self.target.a_s_mps2[first..=last])),
-            truncated_start: None,
-            end_cause: None,
-            frame_switch: None,
-            tag_frames: None,
             synthetic: recording_tags.recording.synthetic,
-            replays: Vec::new(),
+            ..Scenario::default()
         })
     }
 

@@ -177,11 +177,9 @@ impl Parameterization {
         if self.features().is_none_or(|features| features.exists_in(self.category)) {
             return Ok(());
         }
-        Err(Error::usage(
-            Place::item(self.name()),
-            format!("{} has no {}", self.category.label(), self.description()),
-            "an LVD changes its speed and stays in its lane; a sinusoid belongs to an LVD",
-        ))
+        let problem = format!("{} has no {}", self.category.label(), self.description());
+        let help = "an LVD changes its speed and stays in its lane; a sinusoid belongs to an LVD";
+        Err(Error::usage(Place::item(self.name()), problem, help))
     }
 
     /// Encodes a mined scenario as a point; an SVD parameterization needs its decomposition.

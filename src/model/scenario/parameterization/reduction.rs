@@ -278,11 +278,8 @@ pub struct ModeShape {
 fn vector(scenario: &Scenario, options: &ParameterizationOptions) -> Result<Vec<f64>> {
     let n = options.svd_instants;
     if n < 2 {
-        return Err(Error::usage(
-            lanesweep_support::Place::item("svd_instants"),
-            format!("{n} instants cannot describe a series"),
-            "use 50, as published",
-        ));
+        let (problem, help) = (format!("{n} instants cannot describe a series"), "use 50, as published");
+        return Err(Error::usage(lanesweep_support::Place::item("svd_instants"), problem, help));
     }
     let duration_s = scenario.duration_s();
     let sample = |series: &[f64], sign: f64| -> Vec<f64> {

@@ -39,11 +39,10 @@ pub fn fit_svd(
     let n = rows.len();
     let place = || Place::item(name);
     if n <= needed {
-        return Err(Error::input(
-            place(),
-            format!("{n} scenarios are too few for a decomposition with {needed} parameters"),
-            format!("at least {} are needed: use more data; the kinematic parameterizations still run", needed + 1),
-        ));
+        let problem = format!("{n} scenarios are too few for a decomposition with {needed} parameters");
+        let help =
+            format!("at least {} are needed: use more data; the kinematic parameterizations still run", needed + 1);
+        return Err(Error::input(place(), problem, help));
     }
     let weights = column_weights(rows, (series, lateral), instants, scale, name)?;
     decompose(rows, weights, name)
@@ -81,11 +80,9 @@ fn column_weights(
     }
     weights.extend((series * instants..p).map(|column| 1.0 / deviation(column)));
     if weights.iter().any(|w| !w.is_finite()) {
-        return Err(Error::input(
-            Place::item(name),
-            "a series, a duration, a speed or a gap is equal in all scenarios and cannot be scaled",
-            "use scenarios that differ in speed, lateral motion, duration and gap",
-        ));
+        let problem = "a series, a duration, a speed or a gap is equal in all scenarios and cannot be scaled";
+        let help = "use scenarios that differ in speed, lateral motion, duration and gap";
+        return Err(Error::input(Place::item(name), problem, help));
     }
     Ok(weights)
 }

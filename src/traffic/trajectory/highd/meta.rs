@@ -182,6 +182,7 @@ pub(super) fn read_tracks_meta(
         let vehicle = columns.vehicle(&table, recording)?;
         check_plausible(&table, columns.length, Quantity::Length, vehicle.length_m, doubts)?;
         check_plausible(&table, columns.width, Quantity::Width, vehicle.width_m, doubts)?;
+        doubts.check_shape(vehicle.length_m, vehicle.width_m, || table.field(columns.length).to_string());
         vehicles.push((vehicle, table.place()));
     }
     if vehicles.is_empty() {

@@ -171,6 +171,9 @@ impl Understanding {
         let lanes = recording.carriageways.iter().flat_map(|of| of.lane_lines_m.windows(2));
         lanes.for_each(|two| check(Quantity::LaneWidth, two[0] - two[1], "a lane".to_owned()));
         check(Quantity::Rate, recording.frame_rate_hz, "frame rate".to_owned());
+        for of in &recording.tracks {
+            doubts.check_shape(of.length_m, of.width_m, || format!("vehicle {}", of.id));
+        }
         grave.into_iter().for_each(|first| self.refuse(first));
         // A wrong ratio names the unit already.
         let is_named = self.seen.has_wrong_ratio;
