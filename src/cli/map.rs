@@ -19,7 +19,7 @@ use lanesweep_report::map::MapReport;
 use lanesweep_run::grid::{self, Grid, GridText, MapGrids, MapOptions, MapResult, PARAMETERS, presets::Presets};
 use lanesweep_support::readable::{count, value};
 use lanesweep_support::run_folder::RunFolder;
-use lanesweep_support::{Error, Place, Result, option};
+use lanesweep_support::{Error, Place, Result};
 
 /// Seed of the random selection of device lanes that the CPU recomputes.
 const RECHECK_SEED: u64 = 1;

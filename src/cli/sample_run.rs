@@ -20,7 +20,7 @@ use lanesweep_support::files::check_folder;
 use lanesweep_support::readable::{count, counted, duration};
 use lanesweep_support::run_folder::RunFolder;
 use lanesweep_support::table::TableWriter;
-use lanesweep_support::{Error, Place, Result, option};
+use lanesweep_support::{Error, Place, Result};
 
 impl Sample {
     pub(crate) fn run(&self, configured: &Configured) -> Result<Output> {
