@@ -211,7 +211,7 @@ pub(super) fn headways(list: &[String]) -> Result<Vec<Headway>> {
         }
         let value = text.trim().parse::<f64>().ok().filter(|v| v.is_finite() && *v > 0.0 && *v < 1e4);
         if let Some(value) = value.filter(|value| !Quantity::Headway.is_plausible(*value)) {
-            tracing::warn!("{}: {} is used as it is", option("thw"), Quantity::Headway.describe(value));
+            tracing::warn!("{}: {} (used as it is)", option("thw"), Quantity::Headway.describe(value));
         }
         value.map(Headway::thw).ok_or_else(|| {
             let problem = format!("`{text}` is not a time headway");

@@ -139,7 +139,8 @@ impl SourceFlags {
         {
             if let Some((given, recorded)) = pair.filter(|(given, recorded)| !(0.5..=2.0).contains(&(given / recorded)))
             {
-                tracing::warn!("--{flag} {given} is used, but the recordings of these scenarios have {recorded:.1}");
+                let recorded = lanesweep_support::readable::value(recorded);
+                tracing::warn!("--{flag} {given} is used, but the recordings of these scenarios have {recorded}");
             }
         }
         provenance.driven = given.known().or(provenance.driven);

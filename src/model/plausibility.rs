@@ -119,6 +119,8 @@ impl Quantity {
             |(_, per_own): &&(&str, f64)| value.abs() > of.plausible.1 && contains(of.plausible, value / per_own);
         let (unit, text) = (of.unit, readable::value(value));
         let hint = match of.mistaken.iter().find(is_large) {
+            // A lane is this wide, and no vehicle in feet.
+            _ if self == Quantity::Width && (3.2..=4.0).contains(&value) => "; is it the lane's?".to_owned(),
             Some((other, per_own)) => {
                 format!("; {text} looks like {other}: {} {unit}", readable::value(value / per_own))
             }
