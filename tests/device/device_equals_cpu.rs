@@ -67,6 +67,7 @@ fn lanes_that_start_at_the_minimum_following_distance_are_equal() {
 }
 
 #[test]
+#[ignore = "minutes on a software device"]
 fn random_lanes_and_lanes_on_thresholds_are_equal_under_every_profile() {
     let Some(gpu) = open(GpuOptions::default()) else { return };
     for name in Profile::names() {
@@ -77,6 +78,7 @@ fn random_lanes_and_lanes_on_thresholds_are_equal_under_every_profile() {
 }
 
 #[test]
+#[ignore = "minutes on a software device"]
 fn lanes_are_equal_under_every_form_of_every_option_and_at_other_time_steps() {
     let Some(gpu) = open(GpuOptions::default()) else { return };
     for profile in &forms() {
