@@ -122,7 +122,9 @@ impl RunFolder {
     /// not ours must be empty.
     fn former(&self) -> Result<FileList> {
         let Some(mut list) = FileList::read(&self.dir) else {
-            let entries = std::fs::read_dir(&self.dir).map_err(|e| Error::io(&self.dir, "read", e))?;
+            // It was there when it was locked.
+            let vanished = |e| std::io::Error::other(format!("the folder {} vanished: {e}", self.dir.display()));
+            let entries = std::fs::read_dir(&self.dir).map_err(|e| Error::io(&self.dir, "read", vanished(e)))?;
             let names = entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned());
             let is_work = |name: &String| name.starts_with('.') || WORK.iter().any(|end| name.ends_with(end));
             return match names.filter(|name| !is_work(name)).min() {
