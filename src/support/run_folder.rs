@@ -9,7 +9,7 @@
 //! Parts of a run use the folder together and exclude whole runs: `parts`.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -123,8 +123,10 @@ impl RunFolder {
     fn former(&self) -> Result<FileList> {
         let Some(mut list) = FileList::read(&self.dir) else {
             // It was there when it was locked.
-            let vanished = |e| std::io::Error::other(format!("the folder {} vanished: {e}", self.dir.display()));
-            let entries = std::fs::read_dir(&self.dir).map_err(|e| Error::io(&self.dir, "read", vanished(e)))?;
+            let vanished = || std::io::Error::other(format!("the folder {} vanished", self.dir.display()));
+            let entries = std::fs::read_dir(&self.dir);
+            let entries = entries.map_err(|e| if e.kind() == ErrorKind::NotFound { vanished() } else { e });
+            let entries = entries.map_err(|e| Error::io(&self.dir, "read", e))?;
             let names = entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned());
             let is_work = |name: &String| name.starts_with('.') || WORK.iter().any(|end| name.ends_with(end));
             return match names.filter(|name| !is_work(name)).min() {
