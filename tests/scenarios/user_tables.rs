@@ -200,7 +200,7 @@ fn what_is_wrong_with_parameters_is_told_with_line_and_column() {
         let error = of("p.csv", &CASES.replacen(old, new, 1)).expect_err(new);
         let text = error.to_string();
         assert!(text.contains(place) && text.contains(problem), "{new}: {text}");
-        let windows = of("s.csv", &INSTANTS.replacen(old, new, 1).replace('\n', "\r\n")).expect_err(new);
+        let windows = of("p.csv", &CASES.replacen(old, new, 1).replace('\n', "\r\n")).expect_err(new);
         assert!(windows.to_string().contains(place), "{windows}");
         assert!(error.help().unwrap().contains(help), "{new}: {:?}", error.help());
     }
