@@ -350,7 +350,11 @@ fn layers(typed: &[Assignment]) -> Result<Layers> {
         return Err(Error::usage(Place::option("config"), problem, help));
     }
     check_variables(&Key::all())?;
-    Layers::read(typed, std::env::var_os(FILE_VARIABLE).as_deref())
+    let file = std::env::var_os(FILE_VARIABLE).filter(|file| !file.is_empty());
+    if let Some(file) = file.as_ref().filter(|_| !typed.iter().any(|one| matches!(one, Assignment::File(_)))) {
+        tracing::info!("configuration of {FILE_VARIABLE}: {}", file.display());
+    }
+    Layers::read(typed, file.as_deref())
 }
 
 /// The flag of an argument, with its dashes.

@@ -83,7 +83,10 @@ const MORE_EXAMPLES: &str = "Examples:\n  \
 
 fn after_long_help() -> String {
     let names: Vec<&str> = PARAMETERS.iter().map(|p| p.key).collect();
-    format!("Parameters: {}\n\n{MORE_EXAMPLES}", names.join(", "))
+    format!(
+        "Parameters: {}\nA relative speed is the other vehicle's minus the ego's: negative where they close in.\n\n{MORE_EXAMPLES}",
+        names.join(", ")
+    )
 }
 
 impl Map {

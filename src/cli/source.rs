@@ -137,10 +137,12 @@ impl SourceFlags {
         for (flag, pair) in
             [("hours", given.hours.zip(recorded.hours)), ("km", given.kilometres.zip(recorded.kilometres))]
         {
-            if let Some((given, recorded)) = pair.filter(|(given, recorded)| !(0.5..=2.0).contains(&(given / recorded)))
+            if let Some((given, recorded)) =
+                pair.filter(|(given, recorded)| !(0.99..=1.01).contains(&(given / recorded)))
             {
                 let recorded = lanesweep_support::readable::value(recorded);
-                tracing::warn!("--{flag} {given} is used, but the recordings of these scenarios have {recorded}");
+                let given = option(&format!("{flag} = {given}"));
+                tracing::warn!("{given} is used, but the recordings of these scenarios have {recorded}");
             }
         }
         provenance.driven = given.known().or(provenance.driven);

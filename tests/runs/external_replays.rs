@@ -58,6 +58,13 @@ fn s_prime_of_other_programs_and_of_bases_of_other_folds_are_scored() {
     };
     assert!(thinned(25.0).contains("thinned.jsonl: every S' (cut-in) lasts 0."), "{}", thinned(25.0));
     assert!(!thinned(12.5).contains("thinned.jsonl: "), "{}", thinned(12.5));
+    let slower = cut_ins.iter().cloned().map(|mut row| {
+        row["ego"]["v0"] = (0.8 * row["ego"]["v0"].as_f64().unwrap()).into();
+        format!("{row}\n")
+    });
+    std::fs::write(of("slower.jsonl"), slower.collect::<String>()).unwrap();
+    let text = said(dir.path(), &format!("{} slower.jsonl --categories cut-in --out ids", &study[3..])).1;
+    assert!(text.contains("begin with another speed of the ego"), "{text}");
     // What is wrong is said.
     let scenarios = read_scenario_file(&of("scenarios.jsonl"), Implausible::Refused).unwrap().scenarios;
     let id = &scenarios.iter().find(|s| s.kept && s.category == Category::CutIn).unwrap().id;

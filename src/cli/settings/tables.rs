@@ -140,7 +140,7 @@ settings! {
         /// Kind of interval of `mc`.
         pub interval: IntervalKind = IntervalKind::Wilson,
         /// Level of the intervals.
-        #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
+        #[schemars(extend("minimum" = 0.5, "exclusiveMaximum" = 1.0))]
         pub level: f64 = 0.95,
         /// Reach this half-width over estimate. It is that of the draws' interval; mc checks it after 4096·2^k
         /// samples. The default of is is 0.1 unless the number of samples is given; else none.

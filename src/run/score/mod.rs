@@ -237,7 +237,7 @@ settings! {
         /// Seed that chooses the lanes to check on the CPU. No score depends on it.
         pub seed: u64 = 157,
         /// Coverage of the intervals (0.95).
-        #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
+        #[schemars(extend("minimum" = 0.5, "exclusiveMaximum" = 1.0))]
         pub confidence: f64 = 0.95,
         /// Below so many failures in S F1 has no interval; below so many scenarios with one a claim is not evaluated
         /// (10).

@@ -25,6 +25,9 @@ pub struct ExternalReplay {
     pub scenarios: BTreeMap<String, ReducedScenario>,
 }
 
+/// A parameterization keeps the ego's initial speed up to about this, m/s.
+const MAX_EGO_DIFFERENCE_MPS: f64 = 1.0;
+
 impl ExternalReplay {
     /// S' of a scenario file of another program: the ids of S, any sample rate and length. The variants have the name of
     /// the file, with - for other characters than letters, digits, - and _.
@@ -118,6 +121,13 @@ impl ExternalReplay {
         {
             let (file, times, category) = (path.display(), readable::value(least), self.category.label());
             tracing::warn!("{file}: every S' ({category}) lasts {times} times as long as its scenario: check `fps`");
+        }
+        let others = pairs.iter().filter(|(s, own)| (s.ego.v0 - own.v_ego).abs() > MAX_EGO_DIFFERENCE_MPS).count();
+        if self.category != Category::Lvd && 2 * others > pairs.len() {
+            let (file, of, category) = (path.display(), pairs.len(), self.category.label());
+            tracing::warn!(
+                "{file}: {others} of {of} S' ({category}) begin with another speed of the ego than their scenario"
+            );
         }
         // Rows that were shifted or sorted have the ids of other scenarios.
         let difference = |(s, own): (&Scenario, &ReducedScenario)| {
