@@ -250,7 +250,7 @@ def test_messages_name_arguments_and_no_flags(density) -> None:
         (lambda: lanesweep.study(synth_recordings=1, thw=[]), ValueError, "`thw` is empty"),
         (lambda: lanesweep.study(synth_recordings=1, models=[]), ValueError, "`models` is empty"),
         (lambda: lanesweep.study(synth_recordings=1, thw=False), lanesweep.UsageError, "`thw`: False is not a value of it"),
-        (lambda: lanesweep.study(synth_recordings=1, backnd="cpu"), lanesweep.UsageError, "`backnd`: study has no such argument"),
+        (lambda: lanesweep.study(synth_recordings=1, backnd="cpu"), TypeError, "unexpected keyword argument 'backnd'"),
         (lambda: lanesweep.study("recordings", scenarios="a.jsonl"), lanesweep.UsageError, "cannot be used with"),
         (lambda: lanesweep.mine([]), ValueError, "`recordings` is empty"),
         (lambda: lanesweep.study(synth_recordings=1, categories=object()), TypeError, "`categories` has the value <object"),
@@ -278,8 +278,8 @@ def test_values_keep_their_meaning_and_names_their_letters(density, scenarios, t
     assert lanesweep.map("cut-in", panel=panels, config={"run": {"dt_s": 0.02}}, **options, **tiny).status == "ok"
     case = {"category": "cut-in", "ego_speed": "60km/h", "speed": "40km/h", "gap": 15, "lateral_speed": 1.0}
     for call, kind, message in [
-        (lambda: lanesweep.check(**case, gap_=3), lanesweep.UsageError, "`gap_`: check has no such argument"),
-        (lambda: lanesweep.check(**case, quiet=True), lanesweep.UsageError, "`quiet`: check has no such argument"),
+        (lambda: lanesweep.check(**case, gap_=3), TypeError, "unexpected keyword argument 'gap_'"),
+        (lambda: lanesweep.check(**case, quiet=True), TypeError, "unexpected keyword argument 'quiet'"),
         (lambda: lanesweep.check(**case, row=7), lanesweep.UsageError, "`row`: it needs `file`"),
         (lambda: lanesweep.trace(from_=tmp_path), lanesweep.UsageError, "`from_`: it needs `lane`"),
         (lambda: lanesweep.study(scenarios), lanesweep.UsageError, "give it as `scenarios`"),

@@ -10,7 +10,6 @@ use clap::{Arg, ArgAction, ArgMatches, Command};
 use serde::Serialize;
 
 use super::configured;
-use lanesweep_support::plain_text::nearest;
 use lanesweep_support::{Error, Place, Result, option};
 
 /// The value of an argument.
@@ -106,10 +105,7 @@ fn parsed<'a>(
     for (name, value) in given {
         let refused = |problem: String, help: &str| Err(Error::usage(Place::item(option(name)), problem, help));
         let Some(arg) = arguments_of(verb).find(|arg| arg.get_id() == name.as_str()) else {
-            let names: Vec<&str> = arguments_of(verb).map(|arg| arg.get_id().as_str()).collect();
-            let near = nearest(name, names.iter().copied(), 0.7);
-            let help = near.map_or(format!("there are {}", names.join(", ")), |near| format!("did you mean `{near}`?"));
-            return refused(format!("{function} has no such argument"), &help);
+            return refused(format!("{function} has no such argument"), "leave it out");
         };
         let flag = arg.get_long().map(|long| format!("--{long}"));
         match (value, flag, arg.get_action().takes_values()) {

@@ -196,7 +196,7 @@ impl Configured {
             if last.value_source(id) == Some(ValueSource::CommandLine)
                 && let Some(word) = last.get_raw(id).and_then(|mut words| words.next())
             {
-                layers.flag(key, &flag_name(id), &word.to_string_lossy())?;
+                layers.flag(key, &option(id), &word.to_string_lossy())?;
             }
         }
         let configured = Configured::combined(layers, command, cli.common.verbosity())?;
@@ -355,11 +355,6 @@ fn layers(typed: &[Assignment]) -> Result<Layers> {
         tracing::info!("configuration of {FILE_VARIABLE}: {}", file.display());
     }
     Layers::read(typed, file.as_deref())
-}
-
-/// The flag of an argument, with its dashes.
-fn flag_name(id: &str) -> String {
-    format!("--{}", id.replace('_', "-"))
 }
 
 /// Looks for variables that would be ignored silently: those of keys, which earlier versions read, and misspellings of

@@ -25,7 +25,7 @@ pub(crate) enum Origin {
     },
     /// `--config KEY=VALUE`.
     Assignment(String),
-    /// The key's own flag, with its dashes.
+    /// The key's own flag, as the user writes it.
     Flag(String),
 }
 
