@@ -324,7 +324,7 @@ fn bad_input_is_told_with_its_place_and_what_to_do() {
         ("@ --thw sampled", 2, "--with-thw"),
         ("@ --shard 5/5", 2, "no shard 5 of 5"),
         ("@ --shard 0/2 --half-width 0.1", 2, "cannot evaluate a stop rule"),
-        ("@ --level 1", 2, "above 0 and below 1"),
+        ("@ --level 0.05", 2, "at least 0.5 and below 1"),
         ("newer.json", 3, "version 2"),
         ("cut.json", 3, "cut.json"),
         ("@ --estimator is --thw 1 --proposal @", 3, "no proposal"),
