@@ -136,9 +136,10 @@ fn needs_no_value(arg: &Arg) -> bool {
 
 /// An error of the command line in the words of a call; `needing` is the argument that needs the missing one.
 fn refusal(verb: &Command, error: &clap::Error, needing: Option<&str>) -> Error {
-    // Clap names an argument as its usage shows it.
+    // Clap names an argument as its usage shows it: a position in brackets.
+    let bare = |shown: &str| shown.trim_matches(['[', ']', '<', '>']).to_owned();
     let name = |shown: &String| {
-        let arg = verb.get_arguments().find(|arg| arg.to_string() == *shown);
+        let arg = verb.get_arguments().find(|arg| bare(&arg.to_string()) == bare(shown));
         option(arg.map_or(shown.as_str(), |arg| arg.get_id().as_str()))
     };
     let texts = |kind| match error.get(kind) {

@@ -183,7 +183,7 @@ impl Grid {
         Ok(())
     }
 
-    /// The panels: a value for each of [`Grid::panel_axes`]. At least one.
+    /// The panels: a value for each panel axis. At least one.
     pub fn panels(&self) -> &[Vec<f64>] {
         &self.panels
     }
