@@ -283,7 +283,7 @@ def test_values_keep_their_meaning_and_names_their_letters(density, scenarios, t
         (lambda: lanesweep.check(**case, row=7), lanesweep.UsageError, "`row`: it needs `file`"),
         (lambda: lanesweep.trace(from_=tmp_path), lanesweep.UsageError, "`from_`: it needs `lane`"),
         (lambda: lanesweep.study(scenarios), lanesweep.UsageError, "give it as `scenarios`"),
-        (lambda: lanesweep.study(scenarios=scenarios, out=""), lanesweep.UsageError, "`out`: a path is needed"),
+        (lambda: lanesweep.study(scenarios=scenarios, out=""), lanesweep.UsageError, "`out`: it is empty"),
         (lambda: lanesweep.study(scenarios=tmp_path / "my --models.jsonl"), lanesweep.LanesweepError, "my --models.jsonl"),
         (lambda: lanesweep.tracks(), lanesweep.UsageError, "there is nothing to read"),
         (lambda: lanesweep.tracks(scenarios), lanesweep.InputError, "scenarios.jsonl"),

@@ -118,7 +118,7 @@ pub(crate) fn repeated<K: Eq + Hash, S: Display>(list: impl IntoIterator<Item = 
 /// Checks that no value of a list repeats an earlier one.
 ///
 /// # Errors
-/// [`Error::Usage`] at `place`, with the text of [`repeated`].
+/// [`Error::Usage`] at `place`, with the text of `repeated`.
 pub fn refuse_repeats<K: Eq + Hash, S: Display>(
     place: impl FnOnce() -> Place,
     list: impl IntoIterator<Item = (K, S)>,

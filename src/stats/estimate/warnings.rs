@@ -12,7 +12,7 @@ use lanesweep_support::readable::significant;
 pub enum Warning {
     /// No failure in the sample: the probability is only bounded from above.
     NoFailures,
-    /// Fewer than [`Warning::MIN_FAILURES`] failures: normal intervals do not hold.
+    /// Fewer than `Warning::MIN_FAILURES` failures: normal intervals do not hold.
     FewFailures {
         /// How many.
         failures: u64,
@@ -40,31 +40,31 @@ pub enum Warning {
         /// The interval excludes 1.
         is_decided: bool,
     },
-    /// Effective sample size over the failures below [`Warning::MIN_EFFECTIVE_SIZE`]: the variance itself is
+    /// Effective sample size over the failures below `Warning::MIN_EFFECTIVE_SIZE`: the variance itself is
     /// badly known.
     LowEffectiveSize {
         /// (Σw)²/Σw² over failures.
         effective_size: f64,
     },
-    /// One failure carries more than [`Warning::MAX_FRACTION`] of the estimate.
+    /// One failure carries more than `Warning::MAX_FRACTION` of the estimate.
     OneWeightDominates {
         /// Its fraction of the estimate.
         share: f64,
     },
-    /// The mean weight, 1 in expectation, is off by more than [`Warning::MEAN_WEIGHT_ERRORS`] standard errors, or by
-    /// more than [`Warning::MEAN_WEIGHT_OFF`]: part of the density has not been sampled.
+    /// The mean weight, 1 in expectation, is off by more than `Warning::MEAN_WEIGHT_ERRORS` standard errors, or by
+    /// more than `Warning::MEAN_WEIGHT_OFF`: part of the density has not been sampled.
     MeanWeightOff {
         /// The mean weight.
         mean: f64,
         /// |mean − 1| over its standard error.
         standard_errors: f64,
     },
-    /// More than [`Warning::MAX_MISSED`] of the estimate may have been missed: there are too few draws of the density.
+    /// More than `Warning::MAX_MISSED` of the estimate may have been missed: there are too few draws of the density.
     Missed {
         /// Upper end of the interval of what no draw of the density met.
         bound: f64,
     },
-    /// More than [`Warning::MAX_VOID_FRACTION`] of the indices gave no valid point.
+    /// More than `Warning::MAX_VOID_FRACTION` of the indices gave no valid point.
     VoidDraws {
         /// Fraction of void indices.
         share: f64,
