@@ -4,7 +4,7 @@ use clap::Args;
 
 use super::Output;
 use super::format::FormatFlag;
-use lanesweep_support::{Result, option};
+use lanesweep_support::Result;
 
 /// List the compute devices and the one that is used
 ///
@@ -33,8 +33,8 @@ impl Devices {
                 text += NOTHING;
             }
             text + &match auto {
-                Some(index) => format!("{} selects device {index}.\n", option("backend = auto")),
-                None => format!("{} selects the CPU: there is no GPU.\n", option("backend = auto")),
+                Some(index) => format!("{} selects device {index}.\n", lanesweep_support::option("backend = auto")),
+                None => format!("{} selects the CPU: there is no GPU.\n", lanesweep_support::option("backend = auto")),
             }
         };
         let json = || lanesweep_report::records::document(&serde_json::json!({"devices": cards, "auto": auto}));
