@@ -119,8 +119,10 @@ impl Quantity {
             |(_, per_own): &&(&str, f64)| value.abs() > of.plausible.1 && contains(of.plausible, value / per_own);
         let (unit, text) = (of.unit, readable::value(value));
         let hint = match of.mistaken.iter().find(is_large) {
-            // A lane is this wide, and no vehicle in feet.
-            _ if self == Quantity::Width && (3.2..=4.0).contains(&value) => "; is it the lane's?".to_owned(),
+            // In feet it would be that of a motorcycle.
+            _ if self == Quantity::Width && (3.2..=5.2).contains(&value) => {
+                "; is it the lane's, or a length?".to_owned()
+            }
             Some((other, per_own)) => {
                 format!("; {text} looks like {other}: {} {unit}", readable::value(value / per_own))
             }
@@ -198,8 +200,9 @@ impl Doubts {
     /// Checks that a vehicle is at least as long as wide; `place` returns the place of its length.
     #[inline]
     pub fn check_shape(&mut self, length_m: f64, width_m: f64, place: impl FnOnce() -> String) {
-        // An implausible length or width has its own sentence.
-        if length_m < width_m && Quantity::Length.is_plausible(length_m) && Quantity::Width.is_plausible(width_m) {
+        // An implausible length or width has its own sentence, but for exchanged ones.
+        let fits = |length, width| Quantity::Length.is_plausible(length) && Quantity::Width.is_plausible(width);
+        if length_m < width_m && (fits(length_m, width_m) || fits(width_m, length_m)) {
             let [length, width] = [length_m, width_m].map(readable::value);
             self.contradict(Quantity::Length, format!("{}: {length} m, but the width is {width} m", place()));
         }

@@ -94,3 +94,17 @@ fn a_sheet_names_program_and_profile_and_a_comment_is_no_other_profile() {
         "{commit}"
     );
 }
+
+/// For who reads the chapter in place of a sheet.
+#[test]
+fn the_chapter_for_assessors_lists_what_a_sheet_does_not_consider() {
+    let dir = tempfile::tempdir().unwrap();
+    let document = sheet(dir.path(), CASE).0;
+    let chapter = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/src/for-assessors.md")).unwrap();
+    let chapter = chapter.replace("**", "").split_whitespace().collect::<Vec<_>>().join(" ");
+    let not_considered = document["not_considered"].as_array().unwrap();
+    assert!(not_considered.len() > 5);
+    for text in not_considered {
+        assert!(chapter.contains(text.as_str().unwrap()), "{text}");
+    }
+}

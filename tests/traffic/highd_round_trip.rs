@@ -105,6 +105,24 @@ proptest! {
     }
 }
 
+proptest! {
+    /// The reader has its own way through the digits of a short number.
+    #[test]
+    fn numbers_have_the_bits_that_the_standard_library_reads(texts in prop::collection::vec("-?[0-9]{1,2}(\\.[0-9]{0,17})?(e-?[0-2])?", 8)) {
+        let mut tables = small::Texts::small();
+        let line = tables.tracks.lines().position(|line| line.split(',').nth(1) == Some("5")).unwrap() + 1;
+        for (at, text) in texts.iter().enumerate() {
+            tables.tracks = small::with_field(&tables.tracks, line + at, "xAcceleration", text);
+        }
+        // Vehicle 5 drives along the file's x axis.
+        let read = tables.read().unwrap().recording;
+        let track = read.tracks.iter().find(|track| track.id == 5).unwrap();
+        for (text, value) in texts.iter().zip(&track.a_s_mps2) {
+            prop_assert_eq!(value.to_bits(), text.parse::<f64>().unwrap().to_bits(), "{}", text);
+        }
+    }
+}
+
 #[test]
 fn the_checksum_is_the_sha_256_of_the_whole_file() {
     // Expected value from `sha256sum` (GNU coreutils) of these bytes.

@@ -3,7 +3,7 @@
 //!
 //! The stages: rows of a file (`rows`, `times`), vehicles in SI units (`raw`, `samples`, `apart`), gapless pieces (`pieces`,
 //! `boxes`), the lines of the road (`road`, `directions`), lanes (`lanes`), the recording (`assemble`), and what contradicts
-//! itself (`understanding`, `findings`). highD files have their own reader. `lanesweep.tracks` in Python turns
+//! itself (`understanding`, `findings`, `offsets`). highD files have their own reader. `lanesweep.tracks` in Python turns
 //! other formats into a flat table.
 
 mod apart;
@@ -12,6 +12,7 @@ mod boxes;
 mod directions;
 mod findings;
 mod lanes;
+mod offsets;
 mod pieces;
 mod preset;
 mod raw;

@@ -80,21 +80,28 @@ pub struct ColumnName {
 #[derive(Deserialize)]
 #[serde(untagged)]
 enum Written {
+    Names(OneOrMany),
+    WithUnit { name: OneOrMany, unit: Option<String>, factor: Option<f64> },
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum OneOrMany {
     One(String),
     Many(Vec<String>),
-    WithUnit { name: Box<Written>, unit: Option<String>, factor: Option<f64> },
 }
 
 impl From<Written> for ColumnName {
     fn from(written: Written) -> ColumnName {
-        let of = |names| ColumnName { names, unit: None, factor: 1.0 };
-        match written {
-            Written::One(name) => of(vec![name]),
-            Written::Many(names) => of(names),
-            Written::WithUnit { name, unit, factor } => {
-                ColumnName { unit, factor: factor.unwrap_or(1.0), ..ColumnName::from(*name) }
-            }
-        }
+        let (name, unit, factor) = match written {
+            Written::Names(name) => (name, None, None),
+            Written::WithUnit { name, unit, factor } => (name, unit, factor),
+        };
+        let names = match name {
+            OneOrMany::One(name) => vec![name],
+            OneOrMany::Many(names) => names,
+        };
+        ColumnName { names, unit, factor: factor.unwrap_or(1.0) }
     }
 }
 

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::LoadedTracks;
-use super::findings::way;
+use super::offsets::way;
 use super::preset::Preset;
 use super::road::median;
 use crate::trajectory::{Loaded, Noise, Recording, Track, VehicleClass};

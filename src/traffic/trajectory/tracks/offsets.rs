@@ -1,0 +1,156 @@
+//! Where boxes are: on each other, beside the middle of their lane, beside the lane lines of the file.
+
+use std::collections::HashSet;
+
+use super::findings::MIN_VEHICLES;
+use super::road::median;
+use super::understanding::Understanding;
+use crate::trajectory::motion::{JUMP_ACROSS_M, JUMP_ALONG_M, jumps};
+use crate::trajectory::overlap::overlaps;
+use crate::trajectory::{Carriageway, Recording, Track, VehicleClass};
+use lanesweep_support::readable::significant;
+
+/// Fraction of vehicles that overlap from which on sizes or reference point are wrong.
+const MAX_OVERLAPPING: f64 = 0.1;
+/// Offsets from the middle of the lane of so many half widths are those of an edge, which gives 1.
+const MIN_EDGE: f64 = 0.6;
+/// Distance of a lane line from the middle between the vehicles of its lanes from which on it is not where they see it, m.
+const MAX_LINE_OFF_M: f64 = 0.45;
+
+impl Understanding {
+    /// Finds boxes that overlap or are beside the middle of their lanes, and small jumps.
+    pub(super) fn check_boxes(&mut self, recording: &Recording) {
+        let found = overlaps(recording);
+        let involved: HashSet<usize> = found.pairs.iter().flat_map(|(a, b)| [*a, *b]).collect();
+        let is_grave = involved.len() as f64 > MAX_OVERLAPPING * recording.tracks.len() as f64;
+        let what = format!(
+            "pair(s) of vehicles overlap, the first are {}: check sizes and `reference` (centre, front, rear, corner)",
+            found.first
+        );
+        self.find_of(found.pairs.len() as u64, is_grave && involved.len() >= MIN_VEHICLES, &what);
+        if let Some((a, b)) = found.coupled.first().map(|(a, b)| (recording.tracks[*a].id, recording.tracks[*b].id)) {
+            let what = format!(
+                "pair(s) of vehicles drive less than 1 m apart at one distance for 5 s and longer, the first are vehicles {a} and {b}: join them if they are tractor and trailer, else one leads the other"
+            );
+            self.warn_of(found.coupled.len() as u64, &what);
+        }
+        let (mut by_lane, mut by_class) = (Vec::new(), Vec::new());
+        for (at, of) in recording.carriageways.iter().enumerate() {
+            let mut offsets = self.offsets(recording, at);
+            // Lines that follow from positions are amid them, whatever the point.
+            if self.seen.lane_sources.is_empty() {
+                self.check_lines(of, &offsets);
+            }
+            by_class.extend(slope_within(&mut offsets, 0.02));
+            offsets.iter_mut().for_each(|of| of.2 /= 2);
+            by_lane.extend(slope_within(&mut offsets, 0.08));
+        }
+        let is_edge = |(slope, error): &(f64, f64)| (MIN_EDGE..1.6).contains(&slope.abs()) && slope.abs() > 4.0 * error;
+        // Lorries may keep to the right in every direction; an edge in the image is on the other side in the other direction.
+        let is_turned = matches!(by_lane[..], [(a, _), (b, _)] if a * b < 0.0);
+        let found = if is_turned && by_lane.iter().all(is_edge) { by_lane } else { by_class };
+        if let Some((slope, error)) = found.first().filter(|_| found.iter().all(is_edge)) {
+            let (slope, error) = (significant(slope.abs(), 2), significant(*error, 1));
+            self.refuse(format!(
+                "the wider a vehicle, the farther it is beside the middle of its lane: by {slope} ± {error} m for each metre of half its width, where an edge or a corner of the box gives 1, see `reference`"
+            ));
+        }
+        let jumping = recording.tracks.iter().filter(|track| jumps(track, recording.frame_rate_hz)).count();
+        let what = format!("tracks jump by more than {JUMP_ALONG_M} m along or {JUMP_ACROSS_M} m across the road");
+        self.warn_of(jumping as u64, &what);
+    }
+
+    /// Finds lane lines of the file that are not where vehicles see them, by the offsets of those that keep their lanes.
+    fn check_lines(&mut self, lanes: &Carriageway, offsets: &[(f64, f64, u16)]) {
+        let way = way(lanes);
+        let shift = median(&mut offsets.iter().map(|(half_m, mean_m, _)| mean_m / half_m).collect::<Vec<f64>>());
+        if shift.abs() >= MIN_EDGE && offsets.len() >= MIN_VEHICLES {
+            let (shift, side) = (significant(shift.abs(), 2), if shift > 0.0 { "left" } else { "right" });
+            self.refuse(format!(
+                "{way}: half of the vehicles are at least {shift} half widths to the {side} of the middle of their lanes, so that boxes cross lane lines: y is that of another point of the box, or the lane lines are shifted"
+            ));
+            return;
+        }
+        // Where the vehicles of a lane are on average.
+        let middle = |lane: usize| {
+            let of = offsets.iter().filter(|of| usize::from(of.2 / 2) == lane).map(|of| of.1);
+            let (mean_m, error_m) = mean_and_error(of)?;
+            Some((lanes.lane(lane)?.centre_m() + mean_m, error_m))
+        };
+        for line in 1..lanes.lane_count() {
+            let Some(((left_m, a), (right_m, b))) = middle(line - 1).zip(middle(line)) else { continue };
+            let (line_m, error_m) = (lanes.lane_lines_m[line], 0.5 * libm::hypot(a, b));
+            let off_m = line_m - 0.5 * (left_m + right_m);
+            if off_m.abs() > MAX_LINE_OFF_M + 4.0 * error_m {
+                let y_m = if lanes.name == "2" { -line_m } else { line_m };
+                self.warn(format!(
+                    "{way}: the lane marking at y = {y_m:.2} m is {:.2} ± {error_m:.2} m from the middle between the vehicles of its lanes: check the lane markings, which decide when a lane change begins",
+                    off_m.abs()
+                ));
+            }
+        }
+    }
+
+    /// Half the width of each vehicle that keeps its lane, its mean offset to the left of the lane's middle, m, and its lane and
+    /// class. Tells the offsets by class.
+    fn offsets(&mut self, recording: &Recording, carriageway: usize) -> Vec<(f64, f64, u16)> {
+        let lanes = &recording.carriageways[carriageway];
+        let offset = |track: &Track| {
+            let lane = track.lane[0];
+            let is_kept = track.carriageway == carriageway && track.lane.iter().all(|of| *of == lane);
+            let centre_m = lanes.lane(usize::from(lane)).filter(|_| is_kept)?.centre_m();
+            let mean_m = track.d_m.iter().sum::<f64>() / track.len() as f64 - centre_m;
+            Some((track.width_m / 2.0, mean_m, 2 * lane + u16::from(track.class == VehicleClass::Truck)))
+        };
+        let all: Vec<(f64, f64, u16)> = recording.tracks.iter().filter_map(offset).collect();
+        let mean = |(is_truck, class): (u16, &str)| {
+            let (mean_m, error_m) = mean_and_error(all.iter().filter(|of| of.2 % 2 == is_truck).map(|of| of.1))?;
+            Some(format!("{class} {mean_m:.2} ± {error_m:.2} m"))
+        };
+        let means: Vec<String> = [(0, "cars"), (1, "lorries")].into_iter().filter_map(mean).collect();
+        // Lines that follow from positions lie amid cars and lorries; the difference holds whatever the lines are.
+        let mut by_class: Vec<_> = all.iter().map(|of| (f64::from(of.2 % 2), of.1, of.2 / 2)).collect();
+        let beside = slope_within(&mut by_class, 0.08).map_or(String::new(), |(by_m, error_m)| {
+            format!("; lorries {by_m:.2} ± {error_m:.2} m to the left of the cars of their lane")
+        });
+        if !means.is_empty() {
+            let (way, means) = (way(lanes), means.join(", "));
+            self.fact("offsets", format!("{way}: {means} to the left of the middle of their lanes{beside}"));
+        }
+        all
+    }
+}
+
+/// The mean of vehicles' values and its standard error; `None` for few.
+fn mean_and_error(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let values: Vec<f64> = values.collect();
+    let (n, mean) = (values.len() as f64, values.iter().sum::<f64>() / values.len() as f64);
+    let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
+    (values.len() >= MIN_VEHICLES).then(|| (mean, (squares / (n * (n - 1.0))).sqrt()))
+}
+
+/// The direction of a carriageway in words.
+pub(super) fn way(of: &Carriageway) -> &'static str {
+    if of.name == "2" { "forward" } else { "backward" }
+}
+
+/// Slope of the second value over the first within groups, so that the middles of lanes do not matter, and its standard error;
+/// `None` for few values, or if the first varies by less than `least`.
+pub(super) fn slope_within(pairs: &mut [(f64, f64, u16)], least: f64) -> Option<(f64, f64)> {
+    pairs.sort_by(|a, b| a.2.cmp(&b.2).then(a.0.total_cmp(&b.0)).then(a.1.total_cmp(&b.1)));
+    let (mut xx, mut xy, mut yy, mut n, mut groups) = (0.0, 0.0, 0.0, 0, 0);
+    for group in pairs.chunk_by(|a, b| a.2 == b.2).filter(|group| group.len() >= MIN_VEHICLES) {
+        let of = |value: fn(&(f64, f64, u16)) -> f64| group.iter().map(value).sum::<f64>() / group.len() as f64;
+        let (x, y) = (of(|p| p.0), of(|p| p.1));
+        for (half, offset, _) in group.iter() {
+            xx += (half - x) * (half - x);
+            xy += (half - x) * (offset - y);
+            yy += (offset - y) * (offset - y);
+        }
+        n += group.len();
+        groups += 1;
+    }
+    let slope = xy / xx;
+    let residual = (yy - slope * xy).max(0.0) / (n as f64 - f64::from(groups) - 1.0);
+    (n >= 20 && xx / n as f64 > least * least).then(|| (slope, (residual / xx).sqrt()))
+}
