@@ -160,6 +160,8 @@ pub struct Doubts {
     policy: Implausible,
     found: [Finding; LIMITS.len()],
     still: Finding,
+    /// Leaders that brake, and their largest deceleration, m/s².
+    leaders: (u64, f64),
 }
 
 impl Doubts {
@@ -208,6 +210,14 @@ impl Doubts {
         }
     }
 
+    /// Notes a leader's acceleration: in many cases none of which brakes by more than 1.2 m/s², it may be in g.
+    #[inline]
+    pub fn note_leader(&mut self, acceleration_mps2: f64) {
+        if acceleration_mps2 < 0.0 {
+            self.leaders = (self.leaders.0 + 1, self.leaders.1.max(-acceleration_mps2));
+        }
+    }
+
     /// Returns a speed with the noise of a standing vehicle set to 0 and counted.
     #[inline]
     pub fn speed(&mut self, value_mps: f64, place: impl FnOnce() -> String) -> f64 {
@@ -221,6 +231,7 @@ impl Doubts {
     /// Adds the doubts of another input.
     pub fn add(&mut self, other: Doubts) {
         self.still.add(other.still);
+        self.leaders = (self.leaders.0 + other.leaders.0, self.leaders.1.max(other.leaders.1));
         for (own, theirs) in self.found.iter_mut().zip(other.found) {
             own.add(theirs);
         }
@@ -233,6 +244,10 @@ impl Doubts {
         if self.still.count > 0 {
             let Finding { count, first } = &self.still;
             list.push(format!("a speed between {NOISE_MPS} and 0 m/s is taken as 0, {}: {first}", times(*count)));
+        }
+        if let (5.., largest @ ..=1.2) = self.leaders {
+            let (count, largest) = (readable::count(self.leaders.0), readable::value(largest));
+            list.push(format!("no leader of {count} brakes by more than {largest} m/s²: check whether it is in g"));
         }
         for (of, Finding { count, first }) in LIMITS.iter().zip(&self.found).filter(|(_, found)| found.count > 0) {
             list.push(format!("an implausible {} is used as it is, {}: {first}", of.name, times(*count)));

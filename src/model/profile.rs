@@ -132,6 +132,9 @@ const BUILT_IN: [(&str, &str); 6] = [
     ("eu-2022-1426-standing", include_str!("../../configs/profiles/eu-2022-1426-standing.toml")),
 ];
 
+/// A constant by more than this factor from every shipped one is unusual: a decimal point slipped, or it is in g.
+const FAR: f64 = 8.0;
+
 /// Constants of which the first is at most the second.
 const ORDERED: [(&str, &str); 3] = [
     ("fsm.comfortable_deceleration_mps2", "fsm.max_surrogate_deceleration_mps2"),
@@ -198,16 +201,25 @@ impl Profile {
         own.chain(self.driver_bounds()).collect()
     }
 
-    /// Constants that no source or study has, as sentences.
+    /// Constants that are far from those of every shipped profile, as sentences.
     pub fn unusual(&self) -> Vec<String> {
-        let unusual = self.bounds().into_iter().filter(|(_, value, bound)| !bound.is_usual(*value));
-        let sentence = |(key, value, Bound { unit, usual: (min, max), .. }): (String, f64, Bound)| {
-            format!(
-                "profile {}, `{key}`: {value} {unit} is used as it is, usual is {min} to {max}: check its unit",
-                self.name
-            )
+        let shipped: Vec<_> = Profile::names().filter_map(|name| Profile::load(name).ok()).collect();
+        let shipped: Vec<_> = shipped.iter().flat_map(Profile::bounds).collect();
+        let sentence = |(key, value, Bound { unit, .. }): (String, f64, Bound)| {
+            let known = shipped.iter().filter(|(of, shipped, _)| *of == key && *shipped != 0.0);
+            let known = known.map(|(_, shipped, _)| shipped.abs());
+            let (min, max) = known.fold((f64::INFINITY, 0.0), |(min, max): (f64, f64), of| (min.min(of), max.max(of)));
+            // 0 means that there is none. How long a run and its steps are is no matter of units.
+            let is_usual = value == 0.0 || (min / FAR..=max * FAR).contains(&value.abs());
+            (max > 0.0 && !is_usual && !["frame.dt_s", "frame.time_cap_s"].contains(&key.as_str())).then(|| {
+                let range = if min == max { min.to_string() } else { format!("{min} to {max}") };
+                format!(
+                    "profile {}, `{key}`: {value} {unit} is used as it is, shipped profiles have {range}: check its unit",
+                    self.name
+                )
+            })
         };
-        unusual.map(sentence).collect()
+        self.bounds().into_iter().filter_map(sentence).collect()
     }
 
     /// Checks that every constant is finite, in its range and in its order; `place` names the profile in the error.

@@ -294,14 +294,24 @@ fn a_profile_with_an_unusual_constant_is_used_and_reported() {
         (
             "wandering_m = 0.375",
             "wandering_m = 37.5",
-            Some("`cchdm.wandering_m`: 37.5 m is used as it is, usual is 0.01 to 10"),
+            Some("`cchdm.wandering_m`: 37.5 m is used as it is, shipped profiles have 0.375"),
         ),
-        ("\ndelay_s = 0.75", "\ndelay_s = 0.06", Some("`cchdm.delay_s`: 0.06 s is used as it is, usual is 0.1 to 10")),
+        (
+            "\ndelay_s = 0.75",
+            "\ndelay_s = 0.06",
+            Some("`cchdm.delay_s`: 0.06 s is used as it is, shipped profiles have 0.6 to 0.75"),
+        ),
         (
             "jerk_mps3 = 12.65",
             "jerk_mps3 = 1.29",
-            Some("`fsm.jerk_mps3`: 1.29 m/s³ is used as it is, usual is 2 to 1000"),
+            Some("`fsm.jerk_mps3`: 1.29 m/s³ is used as it is, shipped profiles have 12.65"),
         ),
+        (
+            "lane_intrusion_m = 0.3 ",
+            "lane_intrusion_m = 3.0 ",
+            Some("`reg157.lane_intrusion_m`: 3 m is used as it is, shipped profiles have 0.3"),
+        ),
+        ("ttc_s = 2.0", "ttc_s = 0.2", Some("`cchdm.ttc_s`: 0.2 s is used as it is, shipped profiles have 2")),
         ("reaction_time_s = 0.75", "reaction_time_s = 5.0", None),
         ("reaction_time_s = 0.75", "reaction_time_s = 0.1", None),
         ("lateral_acceleration_mps2 = 1.0", "lateral_acceleration_mps2 = 0.8", None),
@@ -310,7 +320,7 @@ fn a_profile_with_an_unusual_constant_is_used_and_reported() {
         assert!([0, 1, 8].contains(&code), "{code}: {text}");
         match expected {
             Some(expected) => assert!(text.contains(expected), "{expected}: {text}"),
-            None => assert!(!text.contains("usual"), "{text}"),
+            None => assert!(!text.contains("is used as it is"), "{text}"),
         }
     }
     for (old, new, expected) in [

@@ -58,6 +58,25 @@ fn s_prime_of_other_programs_and_of_bases_of_other_folds_are_scored() {
     };
     assert!(thinned(25.0).contains("thinned.jsonl: every S' (cut-in) lasts 0."), "{}", thinned(25.0));
     assert!(!thinned(12.5).contains("thinned.jsonl: "), "{}", thinned(12.5));
+    // A distance in feet, and the vehicles of a cut-out exchanged.
+    let changed = |change: &dyn Fn(&mut serde_json::Value)| {
+        let cut_outs = rows().filter(|row| row["category"] == "cut_out" && row["kept"] == true).map(|mut row| {
+            change(&mut row);
+            format!("{row}\n")
+        });
+        std::fs::write(of("changed.jsonl"), cut_outs.collect::<String>()).unwrap();
+        said(dir.path(), &format!("{} changed.jsonl --categories cut-out --out ids", &study[3..])).1
+    };
+    let feet = changed(&|row| row["D"] = (row["D"].as_f64().unwrap() / 0.3048).into());
+    assert!(feet.contains("`D` is 3.28 times that of the scenarios on average"), "{feet}");
+    let exchanged = changed(&|row| {
+        let target = row["target"]["v"].take();
+        row["target"]["v"] = row["lead"]["v"].take();
+        row["lead"]["v"] = target;
+    });
+    assert!(exchanged.contains("begin as if `target` and `lead` were exchanged"), "{exchanged}");
+    let same = changed(&|_| ());
+    assert!(!same.contains("changed.jsonl: "), "{same}");
     let slower = cut_ins.iter().cloned().map(|mut row| {
         row["ego"]["v0"] = (0.8 * row["ego"]["v0"].as_f64().unwrap()).into();
         format!("{row}\n")

@@ -34,7 +34,9 @@ fn each_track(change: impl Fn(&mut Track)) -> Recording {
 }
 
 /// What good recordings must not be told.
-const WORDS: [&str; 8] = [
+const WORDS: [&str; 10] = [
+    "s late against positions",
+    "is usual): check the scale",
     "half widths",
     "lane marking at y",
     "times as far as their speeds",
@@ -255,4 +257,19 @@ fn a_part_of_a_recording_under_other_numbers_counts_once() {
     // Parts that have nothing in common.
     let (_, problems) = driven(&[clip(&whole, "01", [1, frames / 2]), clip(&whole, "02", [frames / 2, frames])]);
     assert_eq!(problems, [""; 0]);
+}
+
+#[test]
+fn positions_across_the_road_that_are_late_and_stretched_roads_are_told() {
+    // A filter delays positions across the road by a second; the speeds come from elsewhere.
+    let about = highd_understood(&each_track(|track| {
+        let d_m = track.d_m.clone();
+        (0..track.len()).for_each(|k| track.d_m[k] = d_m[k.saturating_sub(25)]);
+    }));
+    assert!(says(&about, "lateral speeds are -1.0 s late against positions"), "{:?}", about.findings);
+    // Web Mercator at 51 degrees: without speeds nothing else tells the scale.
+    let mut table = Plain::of(&generated(), 5).without(&["speed", "vx", "vy"]);
+    ["x", "y"].iter().for_each(|axis| table.map(axis, |m, _| 1.589 * m));
+    let about = understood(&table, &|_| ()).unwrap();
+    assert!(says(&about, "m wide (median; 2.7 to 4.6 is usual)"), "{:?}", about.findings);
 }

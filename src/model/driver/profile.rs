@@ -14,8 +14,6 @@ pub struct Bound {
     pub smallest: f64,
     /// Maximum magnitude.
     pub largest: f64,
-    /// Minimum and maximum magnitude in use; other values are reported.
-    pub usual: (f64, f64),
     /// 0 is in the range too.
     pub has_zero: bool,
     /// Negative numbers of these magnitudes are in the range too.
@@ -24,15 +22,15 @@ pub struct Bound {
 
 impl Bound {
     /// A deceleration that a driver demands, m/s². A smaller number is one in g.
-    pub(crate) const DECELERATION: Bound = Bound::new("m/s²", 1.0, 100.0).usually(1.0, 15.0);
+    pub(crate) const DECELERATION: Bound = Bound::new("m/s²", 1.0, 100.0);
     /// A lateral acceleration, m/s²: RSS has less than 1 in use.
-    pub(super) const LATERAL_ACCELERATION: Bound = Bound::new("m/s²", 0.001, 100.0).usually(0.1, 10.0);
+    pub(super) const LATERAL_ACCELERATION: Bound = Bound::new("m/s²", 0.001, 100.0);
     /// An acceleration or deceleration, or 0, m/s².
     pub(super) const ACCELERATION: Bound = Bound::LATERAL_ACCELERATION.or_zero();
-    /// A jerk, m/s³. Those of Annex 3 and of brakes are 10 to 40; a smaller number can be one in g/s.
-    pub(crate) const JERK: Bound = Bound::new("m/s³", 0.001, 1e6).usually(2.0, 1000.0);
-    /// A time, s. Studies vary reaction times from 0.1 to 5 s, thresholds of TTC up to 10 s.
-    pub(crate) const TIME: Bound = Bound::new("s", 0.001, 60.0).usually(0.1, 10.0);
+    /// A jerk, m/s³.
+    pub(crate) const JERK: Bound = Bound::new("m/s³", 0.001, 1e6);
+    /// A time, s.
+    pub(crate) const TIME: Bound = Bound::new("s", 0.001, 60.0);
     /// A delay, or 0, s.
     pub(super) const DELAY: Bound = Bound::TIME.or_zero();
     /// A time step, s.
@@ -40,24 +38,19 @@ impl Bound {
     /// Maximum duration of a run, s: one hour; encounters last seconds.
     pub(crate) const TIME_CAP: Bound = Bound::new("s", 0.001, 3600.0);
     /// A length or width of a vehicle, m.
-    pub(crate) const SIZE: Bound = Bound::new("m", 0.1, 100.0).usually(0.4, 30.0);
+    pub(crate) const SIZE: Bound = Bound::new("m", 0.1, 100.0);
     /// A distance, or 0, m.
-    pub(crate) const DISTANCE: Bound = Bound::new("m", 0.001, 100.0).usually(0.01, 10.0).or_zero();
+    pub(crate) const DISTANCE: Bound = Bound::new("m", 0.001, 100.0).or_zero();
     /// A signed distance, m.
     pub(super) const SIGNED_DISTANCE: Bound = Bound { has_negative: true, ..Bound::DISTANCE };
     /// A number of time steps, or 0.
     pub(super) const STEPS: Bound = Bound::new("steps", 1.0, 1000.0).or_zero();
     /// A ratio of decelerations.
-    pub(crate) const RATIO: Bound = Bound::new("", 0.001, 10.0).usually(0.1, 2.0);
+    pub(crate) const RATIO: Bound = Bound::new("", 0.001, 10.0);
 
     /// From a minimum magnitude above 0 and a maximum.
     pub const fn new(unit: &'static str, smallest: f64, largest: f64) -> Bound {
-        Bound { unit, smallest, largest, usual: (smallest, largest), has_zero: false, has_negative: false }
-    }
-
-    /// With a narrower range in use.
-    pub const fn usually(self, min: f64, max: f64) -> Bound {
-        Bound { usual: (min, max), ..self }
+        Bound { unit, smallest, largest, has_zero: false, has_negative: false }
     }
 
     const fn or_zero(self) -> Bound {
@@ -68,11 +61,6 @@ impl Bound {
     pub fn holds(self, value: f64) -> bool {
         let has_size = (self.smallest..=self.largest).contains(&value.abs());
         (self.has_zero && value == 0.0) || (has_size && (self.has_negative || value > 0.0))
-    }
-
-    /// Whether the value is in use: 0 means that there is none.
-    pub fn is_usual(self, value: f64) -> bool {
-        value == 0.0 || (self.usual.0..=self.usual.1).contains(&value.abs())
     }
 
     /// Minimum and maximum value.

@@ -249,7 +249,9 @@ impl PlainCase {
         if ego != others {
             doubts.check_shape(ego.0, ego.1, || place("ego_length"));
         }
-        if self.category != Category::Lvd && self.lateral_speed_mps > self.speed_mps {
+        if self.category == Category::Lvd {
+            doubts.note_leader(self.acceleration_mps2);
+        } else if self.lateral_speed_mps > self.speed_mps {
             let [lateral, along] = [self.lateral_speed_mps, self.speed_mps].map(readable::value);
             let text = format!("{}: {lateral} m/s, but the vehicle drives at {along} m/s", place("lateral_speed"));
             doubts.contradict(Quantity::LaneChangeSpeed, text);

@@ -122,12 +122,33 @@ impl ExternalReplay {
             let (file, times, category) = (path.display(), readable::value(least), self.category.label());
             tracing::warn!("{file}: every S' ({category}) lasts {times} times as long as its scenario: check `fps`");
         }
-        let others = pairs.iter().filter(|(s, own)| (s.ego.v0 - own.v_ego).abs() > MAX_EGO_DIFFERENCE_MPS).count();
-        if self.category != Category::Lvd && 2 * others > pairs.len() {
-            let (file, of, category) = (path.display(), pairs.len(), self.category.label());
-            tracing::warn!(
-                "{file}: {others} of {of} S' ({category}) begin with another speed of the ego than their scenario"
-            );
+        let first = |of: &[f64]| of.first().copied().unwrap_or(0.0);
+        // What no parameterization changes.
+        type Differs<'a> = &'a dyn Fn(&Scenario, &ReducedScenario) -> bool;
+        let differences: [(&str, Differs); 2] = [
+            ("begin with another speed of the ego than their scenario", &|s, own| {
+                self.category != Category::Lvd && (s.ego.v0 - own.v_ego).abs() > MAX_EGO_DIFFERENCE_MPS
+            }),
+            ("begin as if `target` and `lead` were exchanged", &|s, own| {
+                let Some(lead) = &s.lead else { return false };
+                let [target_mps, lead_mps] = [first(&s.target.v), first(&lead.v)];
+                let off = |a: f64, b: f64| (first(&own.v) - a).abs() + (first(&own.v_lead) - b).abs();
+                off(lead_mps, target_mps) < off(target_mps, lead_mps)
+            }),
+        ];
+        for (what, differs) in differences {
+            let others = pairs.iter().filter(|(s, own)| differs(s, own)).count();
+            if 2 * others > pairs.len() {
+                let (file, of, category) = (path.display(), pairs.len(), self.category.label());
+                tracing::warn!("{file}: {others} of {of} S' ({category}) {what}");
+            }
+        }
+        let sum =
+            |of: &dyn Fn(&Scenario, &ReducedScenario) -> f64| pairs.iter().map(|(s, own)| of(s, own)).sum::<f64>();
+        let times = sum(&|_, own| own.lead_gap_m) / sum(&|s, _| s.lead_gap.unwrap_or(0.0));
+        if self.category == Category::CutOut && !(0.8..=1.25).contains(&times) {
+            let (file, times) = (path.display(), readable::value(times));
+            tracing::warn!("{file}: `D` is {times} times that of the scenarios on average: check its unit and meaning");
         }
         // Rows that were shifted or sorted have the ids of other scenarios.
         let difference = |(s, own): (&Scenario, &ReducedScenario)| {

@@ -30,6 +30,8 @@ const MIN_BEYOND_MPS2: f64 = 0.2;
 /// A raster of positions that is larger, and a larger fraction of the step from sample to sample, is coarse, m.
 const MIN_RASTER_M: f64 = 0.2;
 const MAX_RASTER: f64 = 0.25;
+/// Widths of the lanes of motorways, m.
+const USUAL_LANES_M: std::ops::RangeInclusive<f64> = 2.7..=4.6;
 /// Fewer vehicles prove nothing.
 pub(super) const MIN_VEHICLES: usize = 5;
 
@@ -107,10 +109,14 @@ impl Understanding {
             }
         }
         let (delay, told) = (self.seen.delay, self.seen.acceleration);
-        let is_late = delay.slope().abs() > MAX_DELAY_S.max(4.0 * delay.slope_error());
-        if is_late && !is_off && delay.of_derived > 0.01 * delay.count {
-            let by_s = significant(delay.slope(), 2);
-            self.warn(format!("speeds are {by_s} s late against positions: rows are shifted, or filters delay them"));
+        for (of, name) in delay.into_iter().zip(["speeds", "lateral speeds"]) {
+            let is_late = of.slope().abs() > MAX_DELAY_S.max(4.0 * of.slope_error());
+            if is_late && !is_off && of.of_derived > 0.01 * of.count {
+                let by_s = significant(of.slope(), 2);
+                self.warn(format!(
+                    "{name} are {by_s} s late against positions: rows are shifted, or filters delay them"
+                ));
+            }
         }
         // Below 0.1 m/s in a second there is nothing to compare.
         if told.count > 50.0 && told.of_given.max(told.of_derived) > 0.01 * told.count {
@@ -186,6 +192,18 @@ impl Understanding {
             let (car_m, lorry_m) = (significant(car_m, 3), significant(lorry_m, 3));
             self.warn(format!(
                 "lorries of {lorry_m} m are not longer than cars of {car_m} m: check classes and lengths"
+            ));
+        }
+        let mut widths_m: Vec<f64> = recording
+            .carriageways
+            .iter()
+            .flat_map(|of| of.lane_lines_m.windows(2).map(|two| two[0] - two[1]))
+            .collect();
+        let lane_m = median(&mut widths_m);
+        if Quantity::LaneWidth.is_plausible(lane_m) && !USUAL_LANES_M.contains(&lane_m) {
+            let (lane_m, (least, most)) = (significant(lane_m, 3), (USUAL_LANES_M.start(), USUAL_LANES_M.end()));
+            self.warn(format!(
+                "lanes are {lane_m} m wide (median; {least} to {most} is usual): check the scale of positions, which Web Mercator stretches by the inverse cosine of the latitude"
             ));
         }
         let is_no_lane = |two: &[f64]| !Quantity::LaneWidth.is_plausible(two[0] - two[1]);

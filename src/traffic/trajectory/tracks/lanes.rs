@@ -25,6 +25,7 @@ pub(super) type Lateral = (f64, Option<u32>);
 
 /// Where lane lines come from.
 pub(super) const BY_NAME: &str = "the names of lanes in the file";
+pub(super) const BY_WIDTH: &str = "bands of the width in the preset";
 
 /// Lane lines from left to right; `None` without samples.
 pub(super) fn lane_lines(samples: &[Lateral], width_m: Option<f64>) -> Option<(Vec<f64>, &'static str)> {
@@ -33,7 +34,7 @@ pub(super) fn lane_lines(samples: &[Lateral], width_m: Option<f64>) -> Option<(V
     }
     let named = centres_by_name(samples);
     let (centres, source) = match (named.is_empty(), width_m) {
-        (_, Some(width_m)) => return Some((bands(samples, width_m), "bands of the width in the preset")),
+        (_, Some(width_m)) => return Some((bands(samples, width_m), BY_WIDTH)),
         (false, None) => (named, BY_NAME),
         (true, None) => (centres_by_position(samples), "where vehicles drive"),
     };

@@ -3,6 +3,7 @@
 use std::collections::HashSet;
 
 use super::findings::MIN_VEHICLES;
+use super::lanes::BY_WIDTH;
 use super::road::median;
 use super::understanding::Understanding;
 use crate::trajectory::motion::{JUMP_ACROSS_M, JUMP_ALONG_M, jumps};
@@ -38,7 +39,7 @@ impl Understanding {
         for (at, of) in recording.carriageways.iter().enumerate() {
             let mut offsets = self.offsets(recording, at);
             // Lines that follow from positions are amid them, whatever the point.
-            if self.seen.lane_sources.is_empty() {
+            if self.seen.lane_sources.get(at).is_none_or(|source| *source == BY_WIDTH) {
                 self.check_lines(of, &offsets);
             }
             by_class.extend(slope_within(&mut offsets, 0.02));

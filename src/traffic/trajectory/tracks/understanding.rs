@@ -51,7 +51,8 @@ pub(super) struct Seen {
     /// Speeds and positions do not belong together, which names the unit that is wrong.
     pub has_wrong_ratio: bool,
     /// Derived speeds minus given ones, and the accelerations of the given ones: the slope is by how much they are late, s.
-    pub delay: Comparison,
+    /// Along and across the road.
+    pub delay: [Comparison; 2],
     /// Given lateral speeds and derived ones.
     pub lateral: Comparison,
     /// Given accelerations over a second and the changes of speed.
@@ -168,14 +169,15 @@ impl Understanding {
             let reach = (rate_hz / 2.0).round().max(1.0) as usize;
             let change = |of: &[f64], k: usize| (of[k + reach] - of[k - reach]) * rate_hz / (2 * reach) as f64;
             for k in (reach..s_m.len().saturating_sub(reach)).step_by(reach) {
-                self.seen.delay.add(change(s_m, k) - given[k], change(given, k));
+                self.seen.delay[0].add(change(s_m, k) - given[k], change(given, k));
             }
         }
         if let Some(given) = given_d {
             let reach = (rate_hz / 5.0).round().max(1.0) as usize;
+            let change = |of: &[f64], k: usize| (of[k + reach] - of[k - reach]) * rate_hz / (2 * reach) as f64;
             for k in (reach..d_m.len().saturating_sub(reach)).step_by(reach) {
-                let change = (d_m[k + reach] - d_m[k - reach]) * rate_hz / (2 * reach) as f64;
-                self.seen.lateral.add(given[k], change);
+                self.seen.lateral.add(given[k], change(d_m, k));
+                self.seen.delay[1].add(change(d_m, k) - given[k], change(given, k));
             }
         }
     }
