@@ -1,7 +1,7 @@
 """A nonlinear autoencoder as parameterization: `python autoencoder.py scenarios.jsonl`. Needs the package `scikit-learn`.
 
 Each scenario is a vector of its series at 50 instants, its initial speed, gap and duration. A network with a bottleneck of a few
-numbers learns to reproduce the vectors of the other folds; the folds are those of `study --cross-validate`. The reproduced
+numbers learns to reproduce the vectors of the other folds; the folds are those of `study`. The reproduced
 scenarios go back as S' by `study --external`. The decompositions beside them have seen none of the scenarios that they replay
 either.
 """
@@ -85,8 +85,8 @@ def main() -> None:
     parser.add_argument("--size", type=int, default=4, help="numbers of the bottleneck")
     parser.add_argument("--out", type=Path, default=Path("autoencoder"), help="folder")
     given = parser.parse_args()
-    lanesweep.study(scenarios=given.scenarios, categories=given.category, cross_validate=True, out=given.out / "folds")
-    with (given.out / "folds" / "folds.csv").open(encoding="utf-8") as lines:
+    lanesweep.study(scenarios=given.scenarios, categories=given.category, out=given.out / "folds")
+    with (given.out / "folds" / "tables" / "folds.csv").open(encoding="utf-8") as lines:
         folds = {row["id"]: int(row["fold"]) for row in csv.DictReader(lines)}
     with given.scenarios.open(encoding="utf-8") as lines:
         scenarios = [scenario for scenario in map(json.loads, lines) if scenario["id"] in folds]
@@ -102,11 +102,10 @@ def main() -> None:
     lanesweep.study(
         scenarios=given.scenarios,
         categories=given.category,
-        cross_validate=True,
         external=external,
         out=given.out / "study",
     )
-    print((given.out / "study" / "variants.csv").read_text(encoding="utf-8"))
+    print((given.out / "study" / "tables" / "variants.csv").read_text(encoding="utf-8"))
 
 
 if __name__ == "__main__":

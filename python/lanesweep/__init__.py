@@ -5,7 +5,7 @@ m/s, lengths in m, times in s, accelerations in m/s².
 
 >>> import lanesweep
 >>> result = lanesweep.study(synth_recordings=2)  # without data: on generated recordings
->>> result.table("f1").to_pandas()                # doctest: +SKIP
+>>> result.table("results").to_pandas()                # doctest: +SKIP
 """
 
 from __future__ import annotations

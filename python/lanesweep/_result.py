@@ -48,11 +48,56 @@ class Figure:
         target.write_text(self.svg, encoding="utf-8")
         return target
 
+    def plot(self) -> Any:
+        """Draw the numbers of the figure with Matplotlib, a panel each.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            To change and to save as PNG or PDF.
+        """
+        import matplotlib.pyplot as plt
+
+        numbers = self.path.parent.parent / "tables" / f"{self.path.stem}.csv"
+        if not numbers.is_file():
+            raise ValueError(f"{self.path.name} has no numbers beside it; `svg` is the figure")
+        header, *rows = _rows(numbers)
+        records = [dict(zip(header, row, strict=True)) for row in rows]
+        panels = list(dict.fromkeys(record["panel"] for record in records))
+        columns = min(len(panels), 3)
+        figure, axes = plt.subplots(
+            -(-len(panels) // columns), columns, squeeze=False, figsize=(4 * columns + 2, 3.5 * -(-len(panels) // columns)), layout="constrained"
+        )
+        for axis in axes.flat[len(panels) :]:
+            axis.remove()
+        for panel, axis in zip(panels, axes.flat, strict=False):
+            own = [record for record in records if record["panel"] == panel]
+            names = list(dict.fromkeys(record["row"] for record in own if record["row"]))
+            for name in dict.fromkeys(record["series"] for record in own):
+                series = [record for record in own if record["series"] == name]
+                # Rows with a name have their place on the other axis.
+                x = [float(record["x"]) for record in series]
+                y = [float(record["y"] or -names.index(record["row"])) for record in series]
+                axis.errorbar(x, y, _bars(series, "y", y), _bars(series, "x", x), fmt="o" if names else "o-", markersize=4, label=name)
+            if names and not own[0]["y"]:
+                axis.set_yticks([-at for at in range(len(names))], names)
+            axis.set(title=panel, xlabel=own[0]["x_quantity"], ylabel=own[0]["y_quantity"])
+        axes.flat[0].legend(fontsize="small")
+        return figure
+
     def _repr_svg_(self) -> str:
         return self.svg
 
     def __repr__(self) -> str:
         return f"Figure({self.path.name!r})"
+
+
+def _bars(rows: list[dict[str, str]], axis: str, at: list[float]) -> Any:
+    """Distances to the ends of intervals, as Matplotlib takes them; none without any."""
+    if not any(row[f"{axis}_low"] for row in rows):
+        return None
+    ends = [[float(row[f"{axis}_{end}"] or value) for row, value in zip(rows, at, strict=True)] for end in ("low", "high")]
+    return np.abs(np.array(ends) - np.array(at))
 
 
 class Result:
@@ -116,8 +161,8 @@ class Result:
     def table(self, name: str) -> Frame:
         """Return a table as a frame."""
         value = self.document.get(name)
-        path = self.path / f"{name}.csv" if self.path is not None else None
-        has_file = path is not None and path.is_file()
+        path = next((path for path in self._files("*.csv") if path.stem == name), None)
+        has_file = path is not None
         # Types are those of the document, unless its rows hold more than values.
         if _is_table(value) and not (has_file and any(isinstance(one, dict) for row in value for one in row.values())):
             header, *rows = _rows(path) if path is not None and has_file else [[]]
@@ -135,8 +180,8 @@ class Result:
 
     def figure(self, name: str) -> Figure:
         """Return a figure."""
-        path = self.path / f"{name}.svg" if self.path is not None else None
-        if path is None or not path.is_file():
+        path = next((path for path in self._files("*.svg") if path.stem == name), None)
+        if path is None:
             raise KeyError(f"there is no figure `{name}`; there are {', '.join(self.figures)}")
         return Figure(path, self._keep)
 
@@ -154,7 +199,7 @@ class Result:
         return target
 
     def _files(self, pattern: str) -> Iterator[Path]:
-        return self.folder.glob(pattern) if self.folder is not None else iter(())
+        return self.folder.rglob(pattern) if self.folder is not None else iter(())
 
     def __fspath__(self) -> str:
         if self.path is None:

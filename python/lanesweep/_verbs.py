@@ -44,28 +44,28 @@ __all__ = [
 def study(
     recordings: Path | None = None,
     *,
-    scenarios: Path | Table | None = None,
-    external: Paths | Mapping[str, Any] | None = None,
     preset: Path | None = None,
+    scenarios: Path | Table | None = None,
     filter: bool = False,
     accept_implausible: bool = False,
+    external: Paths | Mapping[str, Any] | None = None,
     synth_recordings: Int | None = None,
     categories: Categories | None = None,
     thw: Headways | None = None,
     published: bool = False,
     models: Models | None = None,
-    cross_validate: bool = False,
     profile: Path | None = None,
     dt: Number | None = None,
     out: Path | None = None,
     rows: Path | None = None,
+    figures: Literal["titled", "plain"] | None = None,
     shard: str | None = None,
+    plan: Path | None = None,
+    plan_only: bool = False,
     config: Config | None = None,
     backend: Literal["auto", "cpu", "gpu"] | None = None,
     device: str | Int | None = None,
     seed: Int | None = None,
-    plan: Path | None = None,
-    plan_only: bool = False,
     threads: Int | None = None,
 ) -> Result:
     """How far do parameterized scenarios agree with recorded ones?
@@ -79,22 +79,22 @@ def study(
     recordings : Path
         Folder of recordings, or a track file, by default synthetic recordings. highD's format, or that of a preset,
         which the names of the columns tell; see `lanesweep tracks`.
-    scenarios : Path | Table
-        Scenario file (.jsonl, .parquet, .csv) instead of recordings.
-    external : Paths | Mapping[str, Any]
-        S' of another program, a scenario file. It has the ids of S; its series may have any sample rate and length.
     preset : Path
         Format of the recordings: exid, sumo-fcd, … or a TOML file, by default detected.
+    scenarios : Path | Table
+        Scenario file (.jsonl, .parquet, .csv) instead of recordings.
     filter : bool
         Keep only scenarios of the file that pass the filters of mining, by default kept as given.
     accept_implausible : bool
         Use physically impossible values (a speed of 108 m/s) with a warning.
+    external : Paths | Mapping[str, Any]
+        S' of another program, a scenario file. It has the ids of S; its series may have any sample rate and length.
     synth_recordings : Int
         Number of generated recordings. They are called `01`, `02`, ….
     categories : Categories
         Kinds of scenario: cut-in, cut-out, lvd, by default all.
     thw : Headways
-        Time headways, s; paper: 2.0, 1.8, … 0.2; r157; observed: the recorded gaps. The paper's claims need all of its
+        Time headways, s: numbers, paper, r157, observed. paper: 2.0, 1.8, … 0.2. The paper's claims need all of its
         headways. r157: the minimum following distance of UN R157, 5.2.3.3, for the ego's speed; a list may contain it.
         observed: each scenario starts from its recorded gap, and a density draws the headway as one more parameter; it
         cannot be combined with other headways.
@@ -102,10 +102,6 @@ def study(
         Set the paper's published numbers (of highD) beside ours: on the page and in run.json.
     models : Models
         Driver models: Reg157, CCHDM, RSS, FSM, by default all.
-    cross_validate : bool
-        Also replay scenarios by bases that have not seen them. Scenarios are divided into folds by recording ([study]
-        folds). Each decomposition gets a variant, 5-cv. A basis fitted on the scenarios that it replays flatters
-        itself.
     profile : Path
         paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc` takes
         jrc-2021 unless it is set.
@@ -115,9 +111,15 @@ def study(
         Folder for tables, figures and run.json.
     rows : Path
         Also write one row per lane: .csv, .jsonl or .parquet.
+    figures : Literal["titled", "plain"]
+        Figures with their texts, or plain ones for a paper: 88 or 180 mm wide, the texts in NAME.txt.
     shard : str
         Compute shard I of N (from 0); `merge` merges them. The part is written to `out`. `auto/N` takes I from a
         Kubernetes Indexed Job or a Slurm array.
+    plan : Path
+        Run a plan that `plan_only` wrote.
+    plan_only : bool
+        Write the plan, plan.json in `out`, and stop.
     config : Config
         Configuration file, or one key of it. `lanesweep config init` writes such a file. Without `config`,
         LANESWEEP_CONFIG names it.
@@ -128,10 +130,6 @@ def study(
         first GPU.
     seed : Int
         Seed that chooses the lanes to check on the CPU. No score depends on it.
-    plan : Path
-        Run a plan that `plan_only` wrote.
-    plan_only : bool
-        Write the plan, plan.json in `out`, and stop.
     threads : Int
         Threads; results do not depend on it, by default all cores.
 
@@ -187,8 +185,8 @@ def tracks(
 def mine(
     recordings: Path,
     *,
-    kept: bool = False,
     preset: Path | None = None,
+    kept: bool = False,
     accept_implausible: bool = False,
     out: Path | None = None,
     config: Config | None = None,
@@ -204,10 +202,10 @@ def mine(
     ----------
     recordings : Path
         Folder of recordings, or a track file.
-    kept : bool
-        Only scenarios that pass the paper's filters.
     preset : Path
         Format of the recordings: exid, sumo-fcd, … or a TOML file, by default detected.
+    kept : bool
+        Only scenarios that pass the paper's filters.
     accept_implausible : bool
         Use physically impossible values (a speed of 108 m/s) with a warning.
     out : Path
@@ -228,12 +226,12 @@ def mine(
 def fit(
     recordings: Path | None = None,
     *,
-    scenarios: Path | Table | None = None,
-    hours: Float | None = None,
-    km: Float | None = None,
     preset: Path | None = None,
+    scenarios: Path | Table | None = None,
     filter: bool = False,
     accept_implausible: bool = False,
+    hours: Float | None = None,
+    km: Float | None = None,
     synth_recordings: Int | None = None,
     categories: Categories | None = None,
     parameterizations: Keys | None = None,
@@ -255,18 +253,18 @@ def fit(
     recordings : Path
         Folder of recordings, or a track file, by default synthetic recordings. highD's format, or that of a preset,
         which the names of the columns tell; see `lanesweep tracks`.
-    scenarios : Path | Table
-        Scenario file (.jsonl, .parquet, .csv) instead of recordings.
-    hours : Float, h
-        Driven time of all egos, by default from the recordings.
-    km : Float, km
-        Driven distance of all egos, by default from the recordings.
     preset : Path
         Format of the recordings: exid, sumo-fcd, … or a TOML file, by default detected.
+    scenarios : Path | Table
+        Scenario file (.jsonl, .parquet, .csv) instead of recordings.
     filter : bool
         Keep only scenarios of the file that pass the filters of mining, by default kept as given.
     accept_implausible : bool
         Use physically impossible values (a speed of 108 m/s) with a warning.
+    hours : Float, h
+        Driven time of all egos, by default from the recordings.
+    km : Float, km
+        Driven distance of all egos, by default from the recordings.
     synth_recordings : Int
         Number of generated recordings. They are called `01`, `02`, ….
     categories : Categories
@@ -304,23 +302,23 @@ def sample(
     thw: Headways | None = None,
     models: Models | None = None,
     profile: Path | None = None,
+    dt: Number | None = None,
     estimator: Literal["auto", "mc", "is"] | None = None,
     samples: Int | None = None,
     criterion: Criterion | None = None,
-    half_width: Float | None = None,
-    dt: Number | None = None,
     level: Float | None = None,
+    half_width: Float | None = None,
     time_limit: Number | None = None,
     rows: Path | None = None,
     failures: Path | None = None,
     out: Path | None = None,
     shard: str | None = None,
+    plan: Path | None = None,
+    plan_only: bool = False,
     config: Config | None = None,
     backend: Literal["auto", "cpu", "gpu"] | None = None,
     device: str | Int | None = None,
     seed: Int | None = None,
-    plan: Path | None = None,
-    plan_only: bool = False,
     threads: Int | None = None,
 ) -> Result:
     """How likely does a driver fail?
@@ -346,6 +344,8 @@ def sample(
     profile : Path
         paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc` takes
         jrc-2021 unless it is set.
+    dt : Number, s
+        Time step, by default the profile's.
     estimator : Literal["auto", "mc", "is"]
         Crude, importance, or the cheaper one. Importance sampling searches the failures, then draws around them; `auto`
         chooses for each model and headway, and is `mc` without a half-width.
@@ -353,13 +353,11 @@ def sample(
         Number of samples, by default 100000, or as needed. With a half-width: the maximum.
     criterion : Criterion
         Criterion of importance sampling and of a half-width.
+    level : Float
+        Level of the intervals.
     half_width : Float
         Reach this half-width over estimate. It is that of the draws' interval; mc checks it after 4096·2^k samples. The
         default of is is 0.1 unless the number of samples is given; else none.
-    dt : Number, s
-        Time step, by default the profile's.
-    level : Float
-        Level of the intervals.
     time_limit : Number, s
         Stop at the first check after this time (not reproducible), by default no limit.
     rows : Path
@@ -372,6 +370,10 @@ def sample(
     shard : str
         Compute shard I of N (from 0); `merge` merges them. The part is written to `out`. `auto/N` takes I from a
         Kubernetes Indexed Job or a Slurm array.
+    plan : Path
+        Run a plan that `plan_only` wrote.
+    plan_only : bool
+        Write the plan, plan.json in `out`, and stop.
     config : Config
         Configuration file, or one key of it. `lanesweep config init` writes such a file. Without `config`,
         LANESWEEP_CONFIG names it.
@@ -382,10 +384,6 @@ def sample(
         first GPU.
     seed : Int
         Seed of the draws.
-    plan : Path
-        Run a plan that `plan_only` wrote.
-    plan_only : bool
-        Write the plan, plan.json in `out`, and stop.
     threads : Int
         Threads; results do not depend on it, by default all cores.
 
@@ -482,11 +480,11 @@ def check(
     gap: Number | None = None,
     thw: Number | None = None,
     lateral_speed: Number | None = None,
-    acceleration: Number | None = None,
-    ahead_gap: Number | None = None,
     lateral_distance: Number | None = None,
+    acceleration: Number | None = None,
     end_speed: Speed | None = None,
     ahead_speed: Speed | None = None,
+    ahead_gap: Number | None = None,
     length: Number | None = None,
     width: Number | None = None,
     ego_length: Number | None = None,
@@ -495,6 +493,7 @@ def check(
     models: Models | None = None,
     profiles: Paths | None = None,
     nominal: bool = False,
+    full: bool = False,
     sheet: Path | None = None,
     rows: Path | None = None,
     date: str | None = None,
@@ -538,16 +537,16 @@ def check(
         Initial time headway instead of the gap.
     lateral_speed : Number, m/s
         Cut-in, cut-out: lateral speed.
-    acceleration : Number, m/s²
-        Acceleration of the other vehicle; an LVD needs one, by default 0.
-    ahead_gap : Number, m
-        Cut-out: gap between the two, bumper to bumper.
     lateral_distance : Number, m
         Cut-in: lateral distance at the start; cut-out: at the end, by default the lane's width.
+    acceleration : Number, m/s²
+        Acceleration of the other vehicle; an LVD needs one, by default 0.
     end_speed : Speed
         Speed at which the acceleration ends, with its unit, by default standstill, or never.
     ahead_speed : Speed
         Cut-out: speed of the vehicle ahead of the cutting-out one, with its unit, by default 0.
+    ahead_gap : Number, m
+        Cut-out: gap between the two, bumper to bumper.
     length : Number, m
         Length of every vehicle, by default the profile's.
     width : Number, m
@@ -565,6 +564,8 @@ def check(
     nominal : bool
         Only the computed answers of a table, by lanes: a million rows take seconds. No perturbation, clause or boundary
         is examined, so that no answer is robust.
+    full : bool
+        Print the whole sheet of a case: other profiles, clauses, readings, hashes.
     sheet : Path
         Also write the sheet of a case, a page to print.
     rows : Path
@@ -606,23 +607,23 @@ def trace(
     gap: Number | None = None,
     thw: Number | None = None,
     lateral_speed: Number | None = None,
-    acceleration: Number | None = None,
-    ahead_gap: Number | None = None,
-    compare: Keys | bool | None = None,
     lateral_distance: Number | None = None,
+    acceleration: Number | None = None,
     end_speed: Speed | None = None,
     ahead_speed: Speed | None = None,
+    ahead_gap: Number | None = None,
     length: Number | None = None,
     width: Number | None = None,
     ego_length: Number | None = None,
     ego_width: Number | None = None,
     lane_width: Number | None = None,
+    compare: Keys | bool | None = None,
     models: Models | None = None,
     profile: Path | None = None,
     dt: Number | None = None,
     plot: Path | None = None,
-    xosc: Path | None = None,
     plot_end: Number | None = None,
+    xosc: Path | None = None,
     ego: Literal["model", "external"] | None = None,
     duration: Number | None = None,
     side: Literal["left", "right"] | None = None,
@@ -666,19 +667,16 @@ def trace(
         Initial time headway instead of the gap.
     lateral_speed : Number, m/s
         Cut-in, cut-out: lateral speed.
-    acceleration : Number, m/s²
-        Acceleration of the other vehicle; an LVD needs one, by default 0.
-    ahead_gap : Number, m
-        Cut-out: gap between the two, bumper to bumper.
-    compare : Keys | bool
-        Also simulate other variants of the lane's scenario. S (the recorded scenario; the default without a value),
-        keys of parameterizations, or all.
     lateral_distance : Number, m
         Cut-in: lateral distance at the start; cut-out: at the end, by default the lane's width.
+    acceleration : Number, m/s²
+        Acceleration of the other vehicle; an LVD needs one, by default 0.
     end_speed : Speed
         Speed at which the acceleration ends, with its unit, by default standstill, or never.
     ahead_speed : Speed
         Cut-out: speed of the vehicle ahead of the cutting-out one, with its unit, by default 0.
+    ahead_gap : Number, m
+        Cut-out: gap between the two, bumper to bumper.
     length : Number, m
         Length of every vehicle, by default the profile's.
     width : Number, m
@@ -689,6 +687,9 @@ def trace(
         Width of the ego, by default that of every vehicle.
     lane_width : Number, m
         Width of the lanes, by default the scenario's, else 3.5.
+    compare : Keys | bool
+        Also simulate other variants of the lane's scenario. S (the recorded scenario; the default without a value),
+        keys of parameterizations, or all.
     models : Models
         Driver models: Reg157, CCHDM, RSS, FSM, by default all.
     profile : Path
@@ -699,11 +700,11 @@ def trace(
     plot : Path
         Also draw the time series. Speed, acceleration, gap, TTC, BTN, PFS, CFS and lateral position, with reaction,
         braking and contact.
+    plot_end : Number, s
+        End of the figure's time axis, by default 2 s after the last change.
     xosc : Path
         Also write ASAM OpenSCENARIO XML 1.2 with OpenDRIVE roads. Every lane becomes NNN-KEY.xosc and NNN-KEY.xodr in
         this folder; index.csv lists them with their outcomes. The other vehicles follow their own motion, step by step.
-    plot_end : Number, s
-        End of the figure's time axis, by default 2 s after the last change.
     ego : Literal["model", "external"]
         Driver of the ego in `xosc`.
     duration : Number, s

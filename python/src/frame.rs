@@ -36,6 +36,15 @@ impl Frame {
     }
 }
 
+/// A cell for readers.
+fn shown(cell: &Bound<'_, PyAny>) -> PyResult<String> {
+    match cell {
+        cell if cell.is_none() => Ok(String::new()),
+        cell if cell.is_instance_of::<PyFloat>() => Ok(cell.call_method1("__format__", (".5g",))?.to_string()),
+        cell => Ok(cell.str()?.to_string()),
+    }
+}
+
 #[pymethods]
 impl Frame {
     fn __len__(&self) -> usize {
@@ -156,8 +165,27 @@ impl Frame {
         slf.py().import("pyarrow")?.call_method1("table", (slf,))
     }
 
-    fn __repr__(&self) -> String {
-        format!("<lanesweep.Frame: {} rows of {}>", self.__len__(), self.columns().join(", "))
+    /// The first rows, as many columns as a line of 120 characters holds.
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        const WIDTH: usize = 120;
+        let mut table = vec![self.columns()];
+        for row in self.rows(py, Some(10))?.iter() {
+            let row = row.cast::<PyDict>()?.values();
+            table.push(row.iter().map(|cell| shown(&cell)).collect::<PyResult<Vec<String>>>()?);
+        }
+        let width = |at: usize| table.iter().map(|row| row[at].chars().count()).max().unwrap_or(0);
+        let widths: Vec<usize> = (0..table[0].len()).map(width).collect();
+        let ends = widths.iter().scan(0, |end, width| {
+            *end += width + 2;
+            Some(*end)
+        });
+        let fitting = ends.take_while(|end| *end <= WIDTH).count().max(1).min(widths.len());
+        let cell = |(text, width): (&String, &usize)| format!("{text:>width$}");
+        let line = |row: &Vec<String>| row.iter().zip(&widths).take(fitting).map(cell).collect::<Vec<_>>().join("  ");
+        let lines: Vec<String> = table.iter().map(line).collect();
+        let more = widths.len() - fitting;
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        Ok(format!("{}\n[{} rows; {fitting} columns{more}]", lines.join("\n"), self.__len__()))
     }
 
     fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {
@@ -173,12 +201,7 @@ impl Frame {
         for row in self.rows(py, Some(SHOWN))?.iter() {
             html += "<tr>";
             for cell in row.cast::<PyDict>()?.values().iter() {
-                let text = match &cell {
-                    cell if cell.is_none() => String::new(),
-                    cell if cell.is_instance_of::<PyFloat>() => cell.call_method1("__format__", (".5g",))?.to_string(),
-                    cell => cell.str()?.to_string(),
-                };
-                html += &format!("<td>{}</td>", escape(&text));
+                html += &format!("<td>{}</td>", escape(&shown(&cell)?));
             }
             html += "</tr>";
         }

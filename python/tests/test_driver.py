@@ -34,7 +34,7 @@ def test_reg157_in_numpy_is_the_built_in_model_to_the_bit(scenarios) -> None:
     assert len(ours) == 200 and ours["collision"].nunique() == 2
     assert ours[columns].equals(theirs[columns])
     # All lanes of a study: cut-ins, cut-outs and leaders, recorded and parameterized.
-    study = lanesweep.study(scenarios=scenarios, models=models).table("failures").to_pandas()
+    study = lanesweep.study(scenarios=scenarios, models=models).table("results").to_pandas()
     by_model = {name: group.drop(columns="model").reset_index(drop=True) for name, group in study.groupby("model")}
     assert by_model["Reg157-numpy"].equals(by_model["Reg157"])
 
@@ -42,7 +42,7 @@ def test_reg157_in_numpy_is_the_built_in_model_to_the_bit(scenarios) -> None:
 def test_a_driver_is_scored_sampled_and_mapped_like_the_built_in_ones(scenarios, density) -> None:
     idm = IDM(headway_s=1.2)
     study = lanesweep.study(scenarios=scenarios, models=["FSM", idm], thw="1.2,0.4")
-    assert {row["model"] for row in study.table("f1").rows()} == {"FSM", "IDM"}
+    assert {row["model"] for row in study.table("results").rows()} == {"FSM", "IDM"}
     assert "IDM" in str(study)
     sample = lanesweep.sample(density, models=[idm], samples=500, thw=1.2)
     assert [row["model"] for row in sample.table("estimates").rows()]== ["IDM"] * 3

@@ -17,7 +17,7 @@ def test_an_autoencoder_goes_through_external_s_prime(scenarios: Path, tmp_path:
     command = [sys.executable, str(EXAMPLES / "autoencoder.py"), str(scenarios)]
     command += ["--category", "lvd", "--size", "3", "--out", str(tmp_path)]
     subprocess.run(command, check=True, capture_output=True, cwd=tmp_path)
-    with (tmp_path / "study" / "variants.csv").open(encoding="utf-8") as lines:
+    with (tmp_path / "study" / "tables" / "variants.csv").open(encoding="utf-8") as lines:
         rows = {row["variant"]: row for row in csv.DictReader(lines)}
     assert {"iii", "iii-cv", "autoencoder-3"} <= rows.keys()
     assert 0 < float(rows["autoencoder-3"]["rmse"]) < 1
@@ -28,6 +28,6 @@ def test_tables_are_external_s_prime_by_their_names(scenarios: Path, tmp_path: P
     frame = pd.read_parquet(tmp_path / "scenarios.parquet")
     options = {"scenarios": scenarios, "categories": "lvd", "models": "FSM", "thw": 0.6}
     study = lanesweep.study(external={"same": frame}, **options)
-    found = study.table("f1").to_pandas()
+    found = study.table("results").to_pandas()
     assert "same" in set(found["variant"]) and (found["data"] == "synthetic").all()
-    assert "external" in set(lanesweep.study(external=frame, **options).table("f1").to_pandas()["variant"])
+    assert "external" in set(lanesweep.study(external=frame, **options).table("results").to_pandas()["variant"])

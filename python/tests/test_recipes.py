@@ -174,8 +174,8 @@ def test_draws_that_are_no_case_have_no_answer_and_one_answer_has_no_index() -> 
 def study(scenarios: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[pl.DataFrame, pl.DataFrame]:
     """Lanes and F1 of leader decelerations, with decompositions that have not seen what they replay."""
     rows = tmp_path_factory.mktemp("study") / "lanes.parquet"
-    found = lanesweep.study(scenarios=scenarios, categories="lvd", models="Reg157", cross_validate=True, rows=rows)
-    return pl.read_parquet(rows), pl.DataFrame(found.table("f1"))
+    found = lanesweep.study(scenarios=scenarios, categories="lvd", models="Reg157", rows=rows)
+    return pl.read_parquet(rows), pl.DataFrame(found.table("results"))
 
 
 @pytest.mark.parametrize("key", ["i", "iii-cv"])
@@ -183,7 +183,7 @@ def test_a_justification_has_the_scores_and_intervals_of_the_study(study: tuple[
     lanes, f1 = study
     for criterion in ("collision", "ttc"):
         found = recipes.justification(lanes, key.removesuffix("-cv"), model="Reg157", criterion=criterion)
-        (of,) = f1.filter(variant=key, criterion=criterion).to_dicts()
+        (of,) = f1.filter(variant=key, criterion=criterion, headway="all").to_dicts()
         scores = {row["quantity"]: row for row in found.scores.to_dicts()}
         assert scores["recall"]["variant"] == key
         for name, column in {"recall": "recall", "precision": "precision", "F1": "f1"}.items():
@@ -358,8 +358,8 @@ def test_a_description_without_emphasis_is_the_decomposition_of_the_study(scenar
     mined = lanesweep.mine(scenarios.parent / "recordings", out=tmp_path / "scenarios.parquet")
     kept = pl.read_parquet(Path(mined)).filter(pl.col("kept"), category="lvd")
     ours = recipes.replayed(recipes.fit_description(kept, 3), kept)
-    f1 = pl.DataFrame(lanesweep.study(scenarios=kept, categories="lvd", external={"ours": ours}).table("f1"))
-    counts = {key: f1.filter(variant=key).select("tp", "fn", "fp", "tn").rows() for key in ("iii", "ours")}
+    f1 = pl.DataFrame(lanesweep.study(scenarios=kept, categories="lvd", external={"ours": ours}).table("results"))
+    counts = {key: f1.filter(variant=key, headway="all").select("tp", "fn", "fp", "tn").rows() for key in ("iii", "ours")}
     assert counts["ours"] == counts["iii"] and len(counts["iii"]) == 12
     emphasis, score = recipes.found_emphasis(kept, 3, evaluations=12)
     assert emphasis.shape == (5,) and 0.5 < score <= 1.0

@@ -34,8 +34,8 @@ def test_a_study_has_the_bytes_of_the_command_line(program, scenarios, tmp_path)
     ours = lanesweep.study(scenarios=scenarios, backend="cpu", out=tmp_path / "ours")
     theirs = program("-q", "study", "--scenarios", scenarios, "--backend", "cpu", "--out", tmp_path / "theirs")
     assert theirs.returncode == 0, theirs.stderr
-    names = {path.name for path in (tmp_path / "ours").iterdir()}
-    assert names == {path.name for path in (tmp_path / "theirs").iterdir()} and len(names) > 20
+    names, theirs_names = ({str(path.relative_to(of)) for path in of.rglob("*.*")} for of in (tmp_path / "ours", tmp_path / "theirs"))
+    assert names == theirs_names and len(names) > 20
     # Times and paths are in the record, in the page, and in the list with their checksums.
     for name in names - {"run.json", "report.html", "lanesweep-files.json"}:
         assert (tmp_path / "ours" / name).read_bytes() == (tmp_path / "theirs" / name).read_bytes(), name
@@ -59,7 +59,7 @@ def test_a_sample_has_the_bytes_of_the_command_line(program, density, tmp_path) 
     words = ["--samples=3000", "--thw=1.2,0.4", "--models=FSM,RSS", "--backend=cpu", f"--out={tmp_path / 'theirs'}"]
     theirs = program("-q", "sample", density, *words)
     assert theirs.returncode == 0, theirs.stderr
-    for name in ["estimates.csv", "convergence.csv", "convergence.svg", "density.json"]:
+    for name in ["estimates.csv", "tables/convergence.csv", "figures/convergence.svg", "density.json"]:
         assert (tmp_path / "ours" / name).read_bytes() == (tmp_path / "theirs" / name).read_bytes(), name
 
 
@@ -68,7 +68,7 @@ def test_a_device_gives_the_same_bytes(density, scenarios, tmp_path) -> None:
         folder = tmp_path / device["backend"]
         lanesweep.sample(density, samples=2000, thw=1.2, **device, failures=folder / "failures.csv", out=folder / "sample")
         lanesweep.study(scenarios=scenarios, thw=1.2, **device, out=folder / "study")
-        names = ["sample/estimates.csv", "failures.csv", "study/f1.csv", "study/failures.csv"]
+        names = ["sample/estimates.csv", "failures.csv", "study/results.csv"]
         return {name: (folder / name).read_bytes() for name in names}
 
     try:
@@ -82,18 +82,20 @@ def test_a_device_gives_the_same_bytes(density, scenarios, tmp_path) -> None:
 
 def test_a_result_has_tables_figures_and_a_page(scenarios) -> None:
     result = lanesweep.study(scenarios=scenarios, thw="1.2,0.6", backend="cpu")
-    frame = result.table("f1").to_pandas()
+    frame = result.table("results").to_pandas()
     assert set(frame["model"]) == {"Reg157", "CCHDM", "RSS", "FSM"}
-    assert frame["variant"].map(type).eq(str).all() and frame["tp"].dtype.kind == "i"
+    assert frame["variant"].map(type).eq(str).all() and frame["failures"].dtype.kind == "i"
+    assert "-cv" in "".join(frame["variant"].unique()) and set(frame["headway"]) == {"all", "0.6s", "1.2s"}
+    shown = repr(result.table("results"))
+    assert shown.startswith(" ") and "Reg157" in shown and f"[{len(frame)} rows;" in shown
+    assert max(map(len, shown.splitlines())) <= 120
     assert frame["f1"].dropna().between(0, 1).all()
-    assert len(result.table("failures")) == len(result.table("failures").to_polars())
-    headways = result.table("headways").to_arrow()
-    assert headways.num_rows == len(result.table("headways"))
+    assert len(result.table("results")) == len(result.table("results").to_polars())
     assert "<svg" in result.figure("radar-cut-in").svg
     assert "<iframe" in result._repr_html_() and "SYNTHETIC" in str(result)
-    header = (Path(result) / "f1.csv").read_text().splitlines()[0].split(",")
-    assert result.table("f1").columns == header and (frame["data"] == "synthetic").all()
-    with pytest.raises(KeyError, match="there are .*f1"):
+    header = (Path(result) / "results.csv").read_text().splitlines()[0].split(",")
+    assert result.table("results").columns == header and (frame["data"] == "synthetic").all()
+    with pytest.raises(KeyError, match="there are .*claims"):
         result.table("f2")
     folder = Path(result)
     assert folder.is_dir()
@@ -104,6 +106,18 @@ def test_a_result_has_tables_figures_and_a_page(scenarios) -> None:
 def test_a_figure_outlives_its_result(scenarios) -> None:
     figure = lanesweep.study(scenarios=scenarios, thw=1.2, models="FSM", backend="cpu").figure("radar-cut-in")
     assert "<svg" in figure.svg
+
+
+def test_figures_are_drawn_with_matplotlib(scenarios, tmp_path) -> None:
+    import matplotlib
+
+    matplotlib.use("Agg")
+    result = lanesweep.study(scenarios=scenarios, models=["FSM", "RSS"], backend="cpu")
+    for name in result.figures:
+        drawn = result.figure(name).plot()
+        assert drawn.axes and all(axes.has_data() for axes in drawn.axes), name
+        drawn.savefig(tmp_path / "figure.png")
+        matplotlib.pyplot.close(drawn)
 
 
 def test_a_time_limit_is_no_interrupt(density, tmp_path) -> None:
@@ -194,9 +208,9 @@ def test_a_table_in_memory_is_a_scenario_file(tmp_path) -> None:
     table = pd.DataFrame(rows)
     table.to_csv(tmp_path / "scenarios.csv", index=False)
     options = {"categories": "cut-in", "thw": [0.6], "backend": "cpu"}
-    expected = lanesweep.study(scenarios=tmp_path / "scenarios.csv", **options).table("failures").rows()
+    expected = lanesweep.study(scenarios=tmp_path / "scenarios.csv", **options).table("results").rows()
     for given in (table, pl.DataFrame(rows), pa.Table.from_pandas(table)):
-        assert lanesweep.study(scenarios=given, **options).table("failures").rows() == expected
+        assert lanesweep.study(scenarios=given, **options).table("results").rows() == expected
 
 
 def test_a_star_import_leaves_the_names_of_python_alone() -> None:
@@ -271,7 +285,7 @@ def test_values_keep_their_meaning_and_names_their_letters(density, scenarios, t
     whole = lanesweep.sample(odd, samples=np.int64(200), thw=np.float32(1.2), **tiny)
     assert from_plan.table("estimates").rows() == whole.table("estimates").rows()
     headways = [np.array([0.6], dtype="float32"), pd.Series([0.6], dtype="Float32"), {0.6}, (0.6,), np.array(0.6)]
-    studies = [lanesweep.study(scenarios=scenarios, thw=thw, **tiny).table("failures").rows() for thw in headways]
+    studies = [lanesweep.study(scenarios=scenarios, thw=thw, **tiny).table("results").rows() for thw in headways]
     assert all(study == studies[0] for study in studies)
     panels = {"ego_speed_kmh": {90, 60, 120}}
     options = {"x": "gap_m=5..9/2", "y": "other_speed_kmh=30,40", "set": pd.Series({"lateral_speed_mps": 1.0})}

@@ -27,10 +27,6 @@ pub(super) struct CaseFlags {
     models: Option<String>,
 }
 
-/// Numbers that only `--help` shows.
-const SELDOM: [&str; 8] =
-    ["lateral_distance", "end_speed", "ahead_speed", "length", "width", "ego_length", "ego_width", "lane_width"];
-
 /// The numbers that have a flag; a duration is of files only.
 fn numbers() -> impl Iterator<Item = &'static CaseNumber> {
     NUMBERS.iter().filter(|number| number.key != "duration")
@@ -57,8 +53,7 @@ impl Args for CaseFlags {
                 // Of what may be negative.
                 .allow_hyphen_values(number.unit().starts_with("m/s"))
                 .help(number.help)
-                .help_heading("Scenario")
-                .hide_short_help(SELDOM.contains(&number.key));
+                .help_heading("Scenario");
             command.arg(if number.key == "gap" { arg.conflicts_with("thw") } else { arg })
         })
     }

@@ -40,9 +40,8 @@ const PROFILES: [&str; 6] = ["un-r157", "eu-2022-1426", "eu-2022-1426-standing",
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:\n  \
-                  lanesweep check --category cut-in --ego-speed 60km/h --speed 40km/h --gap 15 --lateral-speed 1.0 \\\n      \
-                  --sheet case.html\n  \
-                  lanesweep check cases.csv --row 2\n  \
+                  lanesweep check --category cut-in --ego-speed 60km/h --speed 40km/h --gap 15 --lateral-speed 1\n  \
+                  lanesweep check cases.csv --row 2 --sheet case.html\n  \
                   lanesweep check scenarios.jsonl --scenario 01_cut_in_97_91_957 --thw 1.2")]
 pub(super) struct Check {
     /// TOML file, table (.csv, .parquet) or scenario file (.jsonl) with the case
@@ -61,6 +60,9 @@ pub(super) struct Check {
     /// Profiles; the first one decides [default: un-r157, and the five others]
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Models and criteria")]
     profiles: Vec<String>,
+    /// Print the whole sheet of a case: other profiles, clauses, readings, hashes
+    #[arg(long, help_heading = "Output")]
+    full: bool,
     /// Also write the sheet of a case, a page to print
     #[arg(long, value_name = "FILE.html", help_heading = "Output")]
     sheet: Option<PathBuf>,
@@ -73,10 +75,10 @@ pub(super) struct Check {
     #[arg(long, help_heading = "Models and criteria")]
     nominal: bool,
     /// Date of the run, as the sheet is to show it; the clock is not asked
-    #[arg(long, value_name = "TEXT", help_heading = "Output", hide_short_help = true)]
+    #[arg(long, value_name = "TEXT", help_heading = "Output")]
     date: Option<String>,
     /// Author, as the sheet is to show it
-    #[arg(long, value_name = "TEXT", help_heading = "Output", hide_short_help = true)]
+    #[arg(long, value_name = "TEXT", help_heading = "Output")]
     author: Option<String>,
     #[command(flatten)]
     plausibility: PlausibilityFlag,
@@ -144,7 +146,7 @@ impl Check {
         }
         // If input was skipped the answer is incomplete.
         let exit = if request.incomplete { Exit::Incomplete } else { Exit::from(judgements[0].verdict()) };
-        self.format.output(exit, || sheet.text(), || sheet.json())
+        self.format.output(exit, || if self.full { sheet.text() } else { sheet.brief() }, || sheet.json())
     }
 
     /// The table to be judged with all rows.

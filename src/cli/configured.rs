@@ -34,9 +34,9 @@ pub(super) struct Configured {
     started: Instant,
 }
 
-/// A flag that sets a key: the key, the flag, the value's name unless the key defines it, its heading, whether only
-/// `--help` shows it, and its verbs. Range, default and help are the key's.
-type KeyFlag = (&'static str, &'static str, &'static str, &'static str, bool, &'static [&'static str]);
+/// A flag that sets a key: the key, the flag, the value's name unless the key defines it, its heading, and
+/// its verbs. Range, default and help are the key's.
+type KeyFlag = (&'static str, &'static str, &'static str, &'static str, &'static [&'static str]);
 
 const SWEEPING: &[&str] = &["study", "sample", "map", "verify", "show"];
 const SIMULATING: &[&str] = &["study", "sample", "map", "verify", "show", "simulate"];
@@ -44,24 +44,24 @@ const GENERATING: &[&str] = &["study", "fit", "verify", "show"];
 
 #[rustfmt::skip] // a table: one line per flag
 pub(super) const FLAGS: [KeyFlag; 18] = [
-    ("run.threads", "threads", "", RUN, true, &["lanesweep"]),
-    ("run.backend", "backend", "", RUN, false, SWEEPING),
-    ("run.device", "device", "NAME|pci:BUS|INDEX", RUN, false, SWEEPING),
-    ("run.backend", "backend", "", RUN, true, &["check"]),
-    ("run.device", "device", "NAME|pci:BUS|INDEX", RUN, true, &["check"]),
-    ("run.profile", "profile", "NAME|FILE", MODELS, false, SIMULATING),
-    ("run.dt_s", "dt", "", MODELS, true, SIMULATING),
-    ("generator.recordings", "synth_recordings", "", DATA, true, GENERATING),
-    ("generator.recordings", "synth_recordings", "", DATA, false, &["tracks"]),
-    ("score.seed", "seed", "", RUN, false, &["study"]),
-    ("fit.seed", "seed", "", RUN, false, &["fit"]),
-    ("sample.estimator", "estimator", "", MODELS, false, &["sample"]),
-    ("sample.samples", "samples", "", MODELS, false, &["sample"]),
-    ("sample.criterion", "criterion", "", MODELS, false, &["sample"]),
-    ("sample.level", "level", "", MODELS, true, &["sample"]),
-    ("sample.half_width", "half_width", "", MODELS, false, &["sample"]),
-    ("sample.time_limit_s", "time_limit", "", MODELS, true, &["sample"]),
-    ("sample.seed", "seed", "", RUN, false, &["sample"]),
+    ("run.threads", "threads", "", RUN, &["lanesweep"]),
+    ("run.backend", "backend", "", RUN, SWEEPING),
+    ("run.device", "device", "NAME|pci:BUS|INDEX", RUN, SWEEPING),
+    ("run.backend", "backend", "", RUN, &["check"]),
+    ("run.device", "device", "NAME|pci:BUS|INDEX", RUN, &["check"]),
+    ("run.profile", "profile", "NAME|FILE", MODELS, SIMULATING),
+    ("run.dt_s", "dt", "", MODELS, SIMULATING),
+    ("generator.recordings", "synth_recordings", "", DATA, GENERATING),
+    ("generator.recordings", "synth_recordings", "", DATA, &["tracks"]),
+    ("score.seed", "seed", "", RUN, &["study"]),
+    ("fit.seed", "seed", "", RUN, &["fit"]),
+    ("sample.estimator", "estimator", "", MODELS, &["sample"]),
+    ("sample.samples", "samples", "", MODELS, &["sample"]),
+    ("sample.criterion", "criterion", "", MODELS, &["sample"]),
+    ("sample.level", "level", "", MODELS, &["sample"]),
+    ("sample.half_width", "half_width", "", MODELS, &["sample"]),
+    ("sample.time_limit_s", "time_limit", "", MODELS, &["sample"]),
+    ("sample.seed", "seed", "", RUN, &["sample"]),
 ];
 
 /// Tables and keys that determine a plan's lanes; a plan file already contains them.
@@ -84,7 +84,7 @@ pub(super) fn command() -> Command {
 
 /// The flags of a verb that set keys.
 fn flags_of(verb: &str) -> impl Iterator<Item = KeyFlag> {
-    FLAGS.into_iter().filter(move |flag| flag.5.contains(&verb))
+    FLAGS.into_iter().filter(move |flag| flag.4.contains(&verb))
 }
 
 /// Adds the flags that set keys.
@@ -94,10 +94,11 @@ fn with_flags(mut command: Command, keys: &[Key]) -> Command {
     let has_plan = has("plan");
     let data: Vec<&str> = ["recordings", "scenarios", "paths"].into_iter().filter(|id| has(id)).collect();
     let verb = command.get_name().to_owned();
-    for (name, id, value_name, heading, is_seldom, _) in flags_of(&verb) {
+    for (name, id, value_name, heading, _) in flags_of(&verb) {
         let Some(key) = Key::find(keys, name) else { continue };
-        let mut arg = flag(key, id, value_name).help_heading(heading).hide_short_help(is_seldom);
-        arg = arg.global(name == "run.threads");
+        let mut arg = flag(key, id, value_name).help_heading(heading);
+        // What is global is told with the verbs.
+        arg = arg.global(name == "run.threads").hide_short_help(name == "run.threads");
         if has_plan && is_of_plan(name) {
             arg = arg.conflicts_with("plan");
         }

@@ -49,7 +49,7 @@ pub(super) struct Fit {
     ///
     /// `sample` then cannot compare its rates with those of the recorded scenarios. Use it if you share the file but
     /// not the recordings.
-    #[arg(long, help_heading = "Models and criteria", hide_short_help = true)]
+    #[arg(long, help_heading = "Models and criteria")]
     without_scenarios: bool,
     #[command(flatten)]
     exposure: lists::ExposureFlags,

@@ -4,7 +4,6 @@ use clap::{Args, ValueEnum};
 
 use super::{Exit, Output, console};
 use lanesweep_report::study::StudyReport;
-use lanesweep_report::tables;
 use lanesweep_support::Result;
 use lanesweep_support::readable::count;
 use lanesweep_support::run_folder::Results;
@@ -65,13 +64,16 @@ impl FormatFlag {
     }
 
     /// Writes the files of a study and prints its answer.
-    pub(super) fn study(self, report: &StudyReport, results: Results, is_incomplete: bool) -> Result<Output> {
+    pub(super) fn study(
+        self,
+        report: &StudyReport,
+        results: Results,
+        (is_incomplete, is_plain): (bool, bool),
+    ) -> Result<Output> {
         let page = results.dir().join("report.html");
-        let files = report.write(results)?;
+        let files = report.write(results, is_plain)?;
         let width = console::width();
-        let claims = if report.evaluation.claims.is_empty() { "" } else { ", claims" };
-        let rest = format!("TTC, BTN, every interval{claims}: report.html and the CSV files.");
-        let answer = || format!("{}{}\n", report.answer(width), tables::wrap(&rest, width));
+        let answer = || report.answer(width);
         let exit = if is_incomplete { Exit::Incomplete } else { Exit::Ok };
         let printed = self.output(exit, answer, || report.json(&files))?;
         tracing::info!("{} files written; start with {}", files.files.len() + 1, page.display());
@@ -80,7 +82,7 @@ impl FormatFlag {
 
     /// The answer about a plan that `--plan-only` wrote.
     pub(super) fn planned(self, exit: Exit, lanes: u64, path: &std::path::Path) -> Result<Output> {
-        let text = || format!("{} lanes planned in {}\n", count(lanes), path.display());
+        let text = || format!("{} runs planned in {}\n", count(lanes), path.display());
         self.output(exit, text, || {
             lanesweep_report::records::document(
                 &serde_json::json!({"lanes": lanes, "plan": path.display().to_string()}),

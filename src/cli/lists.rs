@@ -107,9 +107,9 @@ impl ModelsFlag {
 /// `--thw` of a verb that replays scenarios.
 #[derive(Debug, Clone, Args)]
 pub(super) struct HeadwaysFlag {
-    /// Time headways, s; paper: 2.0, 1.8, … 0.2; r157; observed: the recorded gaps
+    /// Time headways, s: numbers, paper, r157, observed
     ///
-    /// The paper's claims need all of its headways. r157: the minimum following distance of UN R157, 5.2.3.3, for the
+    /// paper: 2.0, 1.8, … 0.2. The paper's claims need all of its headways. r157: the minimum following distance of UN R157, 5.2.3.3, for the
     /// ego's speed; a list may contain it. observed: each scenario starts from its recorded gap, and a density draws
     /// the headway as one more parameter; it cannot be combined with other headways.
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "paper", help_heading = "Scenario")]

@@ -56,7 +56,7 @@ impl Merge {
                 let (swept, timings) = (&result.summary, Timings::default());
                 let host = Host::of_parts(COMMIT, result.parts, swept.rechecked_lanes);
                 let report = StudyReport::of(&study, &result.counts, None, host, swept, timings)?;
-                self.format.study(&report, folder.results()?, study.facts().incomplete)
+                self.format.study(&report, folder.results()?, (study.facts().incomplete, false))
             }
             Merged::Sample(merged) => {
                 let (sample, result) = *merged;

@@ -15,10 +15,10 @@ pub(super) struct ShardFlags {
     #[arg(long, value_name = "I/N", help_heading = "Run")]
     pub shard: Option<Shard>,
     /// Run a plan that --plan-only wrote
-    #[arg(long, value_name = "FILE", conflicts_with = "plan_only", help_heading = "Run", hide_short_help = true)]
+    #[arg(long, value_name = "FILE", conflicts_with = "plan_only", help_heading = "Run")]
     pub plan: Option<PathBuf>,
     /// Write the plan, plan.json in --out, and stop
-    #[arg(long, conflicts_with = "shard", help_heading = "Run", hide_short_help = true)]
+    #[arg(long, conflicts_with = "shard", help_heading = "Run")]
     pub plan_only: bool,
 }
 

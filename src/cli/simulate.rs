@@ -27,7 +27,7 @@ use lanesweep_support::{Error, Place, Result, option};
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:\n  \
-                  lanesweep simulate --category lvd --ego-speed 30m/s --thw 1 --acceleration -6 --plot case.svg\n  \
+                  lanesweep simulate --category lvd --ego-speed 30m/s --gap 30 --acceleration -6\n  \
                   lanesweep simulate --from lanesweep-out --lane 01_cut_in_97_91_957/2/1.2s/RSS --compare S\n  \
                   lanesweep simulate --scenarios scenarios.jsonl --lane 01_cut_in_97_91_957/S/1.2s/RSS --xosc played")]
 pub(super) struct Simulate {
@@ -67,7 +67,7 @@ pub(super) struct Simulate {
     #[arg(long, value_name = "FILE.svg", help_heading = "Output")]
     plot: Option<PathBuf>,
     /// End of the figure's time axis [default: 2 s after the last change]
-    #[arg(long, value_name = "s", requires = "plot", value_parser = time_s, help_heading = "Output", hide_short_help = true)]
+    #[arg(long, value_name = "s", requires = "plot", value_parser = time_s, help_heading = "Output")]
     plot_end: Option<f64>,
     #[command(flatten)]
     xosc: XoscFlags,

@@ -63,7 +63,7 @@ pub(super) fn complain_of(problems: &[Error], notes: &[String]) {
 #[derive(Debug, Clone, Copy, Args)]
 pub(super) struct PlausibilityFlag {
     /// Use physically impossible values (a speed of 108 m/s) with a warning
-    #[arg(long, help_heading = "Data", hide_short_help = true)]
+    #[arg(long, help_heading = "Data")]
     accept_implausible: bool,
 }
 
@@ -78,7 +78,7 @@ impl PlausibilityFlag {
 #[derive(Debug, Clone, Args)]
 pub(super) struct PresetFlag {
     /// Format of the recordings: exid, sumo-fcd, … or a TOML file [default: detected]
-    #[arg(long, value_name = "NAME|FILE", requires = "recordings", help_heading = "Data", hide_short_help = true)]
+    #[arg(long, value_name = "NAME|FILE", requires = "recordings", help_heading = "Data")]
     pub preset: Option<String>,
 }
 
@@ -96,7 +96,7 @@ pub(super) struct SourceFlags {
     #[arg(long, value_name = "FILE", help_heading = "Data")]
     pub scenarios: Option<PathBuf>,
     /// Keep only scenarios of the file that pass the filters of mining [default: kept as given]
-    #[arg(long, requires = "scenarios", help_heading = "Data", hide_short_help = true)]
+    #[arg(long, requires = "scenarios", help_heading = "Data")]
     filter: bool,
     #[command(flatten)]
     plausibility: PlausibilityFlag,

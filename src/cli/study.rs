@@ -25,6 +25,15 @@ use lanesweep_support::run_folder::{Results, RunFolder};
 use lanesweep_support::{Error, Place, Result};
 use lanesweep_traffic::Source;
 
+/// What the SVG files of a study hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Figures {
+    /// Title, plots, legend and caption
+    Titled,
+    /// Plots and legend
+    Plain,
+}
+
 /// How far do parameterized scenarios agree with recorded ones?
 ///
 /// Mines cut-ins, cut-outs and leader decelerations. Replays each as recorded (S) and parameterized (S') from ten time
@@ -32,8 +41,7 @@ use lanesweep_traffic::Source;
 /// generated recordings. The answer goes to stdout, tables and figures to --out.
 #[derive(Debug, Args)]
 #[command(mut_args(|arg| match arg.get_id().as_str() {
-    "recordings" | "scenarios" | "accept_implausible" | "categories" | "models" | "thw" | "published"
-    | "cross_validate" | "external" => {
+    "recordings" | "scenarios" | "accept_implausible" | "categories" | "models" | "thw" | "published" | "external" => {
         arg.conflicts_with("plan")
     }
     "rows" => arg.conflicts_with_all(["shard", "plan_only"]),
@@ -50,6 +58,9 @@ pub(super) struct Study {
     /// Also write one row per lane: .csv, .jsonl or .parquet
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     rows: Option<PathBuf>,
+    /// Figures with their texts, or plain ones for a paper: 88 or 180 mm wide, the texts in NAME.txt
+    #[arg(long, value_name = "STYLE", value_enum, default_value = "titled", help_heading = "Output")]
+    figures: Figures,
     /// Set the paper's published numbers (of highD) beside ours: on the page and in run.json
     #[arg(long, help_heading = "Models and criteria")]
     published: bool,
@@ -59,12 +70,6 @@ pub(super) struct Study {
     models: lists::ModelsFlag,
     #[command(flatten)]
     headways: lists::HeadwaysFlag,
-    /// Also replay scenarios by bases that have not seen them
-    ///
-    /// Scenarios are divided into folds by recording ([study] folds). Each decomposition gets a variant, 5-cv. A
-    /// basis fitted on the scenarios that it replays flatters itself.
-    #[arg(long, help_heading = "Models and criteria")]
-    cross_validate: bool,
     /// S' of another program, a scenario file
     ///
     /// It has the ids of S; its series may have any sample rate and length. Repeatable.
@@ -114,7 +119,7 @@ impl Study {
             models: self.models.list()?,
             headways: self.headways.list()?,
             parameterization: config.parameterization.clone(),
-            folds: self.cross_validate.then_some(config.study.folds),
+            folds: Some(config.study.folds).filter(|folds| *folds > 1),
             external: Vec::new(),
         };
         let source = self.data.source(configured);
@@ -165,7 +170,7 @@ impl Study {
         };
         let units = run.units();
         let lanes = plan.first_lane_of(units.end) - plan.first_lane_of(units.start);
-        tracing::info!("{} lanes on {}", readable::count(lanes), backend.describe());
+        tracing::info!("{} runs on {}", readable::count(lanes), backend.describe());
         let missing = Total::Exact(run.missing()?);
         let mut rows = self.rows.as_deref().map(|path| study_table(path, study)).transpose()?;
         let mut write = rows.as_mut().map(|rows| |plan: &LanePlan, chunk: &Chunk| write_study_chunk(rows, plan, chunk));
@@ -191,7 +196,8 @@ impl Study {
         }
         self.leave_plan(study, configured.settings.study.keep_plan, &mut results)?;
         let report = StudyReport::of(study, &counts, comparison, host, &swept, timings)?;
-        let output = self.format.study(&report, results, study.facts().incomplete)?;
+        let of = (study.facts().incomplete, self.figures == Figures::Plain);
+        let output = self.format.study(&report, results, of)?;
         run.close()?;
         Ok(output)
     }
@@ -221,7 +227,7 @@ impl Study {
             return Err(Error::usage(Place::item("study.compare_reference"), problem, "leave it out"));
         }
         let Some(lanes) = &self.rows else { return Ok(()) };
-        let results = ["failures.csv", "f1.csv", "claims.csv", "reference.csv", "run.json"];
+        let results = ["results.csv", "run.json"];
         let results = results.into_iter().chain([PLAN_FILE, RUN_PLAN_FILE]);
         let others: Vec<PathBuf> = results.map(|name| self.out.join(name)).collect();
         source::refuse_overwriting(lanes, &others, "rows")?;

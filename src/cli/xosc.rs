@@ -23,13 +23,13 @@ pub(super) struct XoscFlags {
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     xosc: Option<PathBuf>,
     /// Driver of the ego in --xosc
-    #[arg(long, value_enum, default_value_t, requires = "xosc", help_heading = "Output", hide_short_help = true)]
+    #[arg(long, value_enum, default_value_t, requires = "xosc", help_heading = "Output")]
     ego: EgoFlag,
     /// End of the scenario with --ego external [default: 10 s after the lane's last event and end]
-    #[arg(long, value_name = "s", requires = "xosc", value_parser = time_s, help_heading = "Output", hide_short_help = true)]
+    #[arg(long, value_name = "s", requires = "xosc", value_parser = time_s, help_heading = "Output")]
     duration: Option<f64>,
     /// Side in --xosc that the other vehicle comes from or leaves to [default: the scenario's, else left]
-    #[arg(long, value_enum, requires = "xosc", help_heading = "Output", hide_short_help = true)]
+    #[arg(long, value_enum, requires = "xosc", help_heading = "Output")]
     side: Option<SideFlag>,
 }
 

@@ -162,6 +162,8 @@ pub struct Doubts {
     still: Finding,
     /// Leaders that brake, and their largest deceleration, m/s².
     leaders: (u64, f64),
+    /// Vehicles that cut in, and those of them that are faster than the ego.
+    cutters: [u64; 2],
 }
 
 impl Doubts {
@@ -218,6 +220,12 @@ impl Doubts {
         }
     }
 
+    /// Notes whether a vehicle that cuts in is faster than the ego, which is no conflict: if all are, speeds may be exchanged.
+    #[inline]
+    pub fn note_cutter(&mut self, is_faster: bool) {
+        self.cutters = [self.cutters[0] + 1, self.cutters[1] + u64::from(is_faster)];
+    }
+
     /// Returns a speed with the noise of a standing vehicle set to 0 and counted.
     #[inline]
     pub fn speed(&mut self, value_mps: f64, place: impl FnOnce() -> String) -> f64 {
@@ -232,6 +240,7 @@ impl Doubts {
     pub fn add(&mut self, other: Doubts) {
         self.still.add(other.still);
         self.leaders = (self.leaders.0 + other.leaders.0, self.leaders.1.max(other.leaders.1));
+        self.cutters.iter_mut().zip(other.cutters).for_each(|(own, theirs)| *own += theirs);
         for (own, theirs) in self.found.iter_mut().zip(other.found) {
             own.add(theirs);
         }
@@ -248,6 +257,13 @@ impl Doubts {
         if let (5.., largest @ ..=1.2) = self.leaders {
             let (count, largest) = (readable::count(self.leaders.0), readable::value(largest));
             list.push(format!("no leader of {count} brakes by more than {largest} m/s²: check whether it is in g"));
+        }
+        let [all, faster] = self.cutters;
+        if all > 1 && faster == all {
+            let all = readable::count(all);
+            list.push(format!(
+                "the vehicle that cuts in is faster than the ego in all {all} cases: check whose speed is whose"
+            ));
         }
         for (of, Finding { count, first }) in LIMITS.iter().zip(&self.found).filter(|(_, found)| found.count > 0) {
             list.push(format!("an implausible {} is used as it is, {}: {first}", of.name, times(*count)));

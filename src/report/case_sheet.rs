@@ -16,9 +16,9 @@ use lanesweep_model::profile::Profile;
 use lanesweep_model::scenario::{CaseQuantity, KMH, NUMBERS};
 use lanesweep_run::check::{Boundary, Change, Judged, Judgement, Reading, RunEnd, Subject, Verdict};
 use lanesweep_run::grid::VARIED;
-use lanesweep_support::Result;
 use lanesweep_support::readable::value;
 use lanesweep_support::table::{Column, NumberText, Table, json_number};
+use lanesweep_support::{Result, option};
 
 /// What the columns of the drivers show.
 const DRIVERS: &str = "Smallest gap to a vehicle in the ego's path, smallest TTC, largest BTN. At a contact while the gap \
@@ -164,6 +164,25 @@ impl CaseSheet<'_> {
                 |boundary, (at, _)| boundary.models.get(at).map(change),
             )
             .build()
+    }
+
+    /// The answer on one screen.
+    pub fn brief(&self) -> String {
+        let synthetic = if self.is_synthetic { "SYNTHETIC DATA: " } else { "" };
+        let sentences = self.demand().into_iter().chain(self.silent()).chain(self.cautions());
+        let sentences = sentences.map(|sentence| format!("  {}\n", wrap(&sentence, WIDTH - 2).replace('\n', "\n  ")));
+        let [drivers, _] = self.drivers_by_profile();
+        format!(
+            "{synthetic}{}\n{}\n{}{}Where another answer begins, all else equal; the last columns: another collision\n{}\
+             Other profiles, clauses, readings and hashes: {}, or a page to print: {}\n",
+            self.case(),
+            self.answer(),
+            sentences.collect::<String>(),
+            drivers.text(),
+            self.boundaries().text(),
+            option("full"),
+            option("sheet"),
+        )
     }
 
     /// The sheet as text.

@@ -11,7 +11,7 @@ use super::plot::Figure;
 use super::records::PROGRAM;
 use lanesweep_support::Result;
 use lanesweep_support::plain_text::shown;
-use lanesweep_support::run_folder::Results;
+use lanesweep_support::run_folder::{FIGURES, Results, TABLES};
 use lanesweep_support::table::Table;
 
 const STYLE: &str = include_str!("templates/style.css");
@@ -35,16 +35,23 @@ impl PageFigure {
         PageFigure { svg, files: files.iter().map(|file| (*file).to_owned()).collect(), is_wide: width_px > NARROW_PX }
     }
 
-    /// Adds a figure to the results as NAME.svg, and its values as NAME.csv.
-    pub(super) fn add(results: &mut Results, name: &str, figure: &Figure) -> Result<PageFigure> {
-        let numbers = format!("{name}.csv");
+    /// Adds a figure to the results as figures/NAME.svg, and its values as tables/NAME.csv; a plain one with its texts as
+    /// figures/NAME.txt.
+    pub(super) fn add(results: &mut Results, name: &str, figure: &Figure, is_plain: bool) -> Result<PageFigure> {
+        let [numbers, file] = [format!("{TABLES}{name}.csv"), format!("{FIGURES}{name}.svg")];
         results.add(&numbers, figure.csv().as_bytes())?;
-        PageFigure::add_svg(results, name, &figure.svg(), &numbers)
+        if !is_plain {
+            return PageFigure::add_svg(results, name, &figure.svg(), &numbers);
+        }
+        let (plain, texts) = figure.plain();
+        results.add(&file, plain.as_bytes())?;
+        results.add(&format!("{FIGURES}{name}.txt"), texts.as_bytes())?;
+        Ok(PageFigure::new(&figure.svg(), &[&file, &numbers]))
     }
 
-    /// Adds a complete SVG document to the results as NAME.svg; its values are in another of their files.
+    /// Adds a complete SVG document to the results as figures/NAME.svg; its values are in another of their files.
     pub(super) fn add_svg(results: &mut Results, name: &str, svg: &str, numbers: &str) -> Result<PageFigure> {
-        let file = format!("{name}.svg");
+        let file = format!("{FIGURES}{name}.svg");
         results.add(&file, svg.as_bytes())?;
         Ok(PageFigure::new(svg, &[&file, numbers]))
     }

@@ -63,12 +63,14 @@ impl MapReport {
         let is_known = self.grids.iter().any(|mapped| mapped.known_percent.iter().any(Option::is_some));
         let shares = Section::new("shares", "Shares")
             .intro(if is_known { "Known shares are those of the JRC's evidence." } else { "" })
-            .text(self.text());
+            .tables([self.shares().captioned(self.caption())])
+            .parts([Section::new("", "What the columns count").text(self.words())]);
         let reproduction = self.host.section(&self.profile).folded();
         Page {
             title: "Outcomes over a grid".to_owned(),
             lead: format!(
-                "{} simulations: {} over a grid of parameters, profile {}.",
+                "{} {} simulations: {} over a grid of parameters, profile {}.",
+                self.sentence(),
                 count(self.simulations()),
                 self.criterion.label(),
                 self.profile.name

@@ -12,9 +12,38 @@ use lanesweep_support::readable;
 use lanesweep_support::table::{Column, Digits, NumberText, Table};
 
 impl MapReport {
-    /// Fractions as a table.
+    /// Fractions and what they count, as text.
     pub fn text(&self) -> String {
-        let criterion = self.criterion.label();
+        format!("{}\n{}{}", self.caption(), self.shares().text(), self.words())
+    }
+
+    /// What the fractions are of.
+    pub(super) fn caption(&self) -> String {
+        format!(
+            "Share of cells that fail {} under {}, of {} simulations",
+            self.criterion.label(),
+            self.profile.name,
+            readable::count(self.simulations())
+        )
+    }
+
+    /// The fractions of the first maps in a sentence.
+    pub(super) fn sentence(&self) -> String {
+        const SHOWN: usize = 2;
+        let of_map = |mapped: &MappedGrid| {
+            let share = |(at, model): (usize, &ModelId)| {
+                format!("{} in {:.2} %", model.name(), 100.0 * mapped.map.share(at, self.criterion))
+            };
+            let shares: Vec<String> = mapped.map.models.iter().enumerate().map(share).collect();
+            format!("{}: {}", mapped.plan.grid.name, shares.join(", "))
+        };
+        let maps: Vec<String> = self.grids.iter().take(SHOWN).map(of_map).collect();
+        let more = if self.grids.len() > SHOWN { "; …" } else { "" };
+        format!("Of the cells with possible traffic fail {}: {}{more}.", self.criterion.label(), maps.join("; "))
+    }
+
+    /// Fractions as a table.
+    pub(super) fn shares(&self) -> Table {
         let any_known = self.grids.iter().any(|mapped| mapped.known_percent.iter().any(Option::is_some));
         let outcomes = self.shown_outcomes();
         let known = Column::from("known %").digits(Digits::Fixed(1)).null("-");
@@ -39,19 +68,19 @@ impl MapReport {
                 .column(known, |(mapped, at)| mapped.known_percent[at])
                 .column(Column::from("difference").null("-"), difference);
         }
-        let mut text = format!(
-            "Share of cells that fail {criterion} under {}, of {} simulations\n{}",
-            self.profile.name,
-            readable::count(self.simulations()),
-            shares.build().text()
-        );
+        shares.build()
+    }
+
+    /// What the columns count, and cautions.
+    pub(super) fn words(&self) -> String {
+        let mut text = String::new();
         if self.grids.iter().any(|mapped| mapped.is_chosen_to_match) {
             text.push_str(
                 "* The known grid is not published. Ours was chosen so that the share of RSS comes out: that it agrees \
                  confirms nothing.\n",
             );
         }
-        text.push_str(&self.words_of_outcomes(&outcomes));
+        text.push_str(&self.words_of_outcomes(&self.shown_outcomes()));
         text
     }
 

@@ -15,7 +15,7 @@ use lanesweep_run::sampling::{EstimateRow, RiskRate, SampleOptions};
 use lanesweep_stats::density::{DensityModel, Provenance};
 use lanesweep_stats::estimate::{IntervalKind, SearchRound, WeightFigures};
 use lanesweep_support::Result;
-use lanesweep_support::readable::{count, count_of, significant, value};
+use lanesweep_support::readable::{count, count_of, counted, significant, value};
 use lanesweep_support::run_folder::ResultFiles;
 use lanesweep_support::table::{Column, Digits, NumberText, Table, TableOf};
 
@@ -188,35 +188,40 @@ impl SampleReport {
             text.push_str("Rare failures, by importance sampling:\n");
             text.push_str(&self.table(|row| row.is_rare_beside(&self.estimates)).text());
         }
-        for (of, remark) in self.remarks() {
-            let _ = writeln!(text, "{of}: {remark}");
+        let notes: Vec<String> = self.notes();
+        for note in notes.iter().take(MAX_NOTES) {
+            text += &paragraph(note);
         }
-        if self.estimates.iter().any(|r| r.estimate.weights.is_some()) {
-            text.push_str(&self.weights().text());
-        }
-        let intervals = format!(
-            "Intervals at {} %{}. ± is the half-width of P's interval divided by P. ≤ is an upper bound where nothing failed.",
+        let is_compared = self.estimates.iter().any(|row| row.recorded.is_some_and(|of| of.sampled.is_some()));
+        let rest = format!(
+            "Intervals at {} %{}. {}{}",
             value(100.0 * self.level()),
-            self.interval_rule()
+            self.interval_rule(),
+            if is_compared {
+                "P/S, beside the recorded scenarios: = agrees, > too high, < too low, ? undecided. "
+            } else {
+                ""
+            },
+            match notes.len().saturating_sub(MAX_NOTES) {
+                0 => "More on the page.".to_owned(),
+                more => format!("{} and more on the page.", counted(more, "further note")),
+            }
         );
-        for rule in self.rules().chain([intervals]) {
-            text += &paragraph(&rule);
-        }
+        text += &paragraph(&rest);
         if self.density.provenance.synthetic {
             text.push_str("SYNTHETIC DATA: no number above is a statement about real traffic\n");
         }
         text
     }
 
+    /// What is said of the run, the general first, then of its rows.
+    fn notes(&self) -> Vec<String> {
+        let of_rows = self.remarks().into_iter().map(|(of, remark)| format!("{of}: {remark}"));
+        self.cautions().chain(of_rows).collect()
+    }
+
     /// The table of some estimates. P of possible traffic, rates and P/S are there where a row has them.
     pub(super) fn table(&self, is_in: impl Fn(&EstimateRow) -> bool) -> Table {
-        let half_width = |row: &EstimateRow| {
-            NumberText(match 100.0 * row.estimate.relative_half_width {
-                width if !width.is_finite() => "–".to_owned(),
-                wide if wide >= 1000.0 => "> 999 %".to_owned(),
-                percent => format!("{percent:.1} %"),
-            })
-        };
         let has = |of: &dyn Fn(&EstimateRow) -> bool| self.estimates.iter().any(of);
         let sampled = |row: &EstimateRow| row.recorded.and_then(|recorded| recorded.sampled);
         let ratio = |row| sampled(row).and_then(|r| Some(format!("{} {}", short(r.ratio?), r.verdict.mark())));
@@ -228,7 +233,6 @@ impl SampleReport {
             .column("failures", |row| row.estimate.failures)
             .column(three_digits("P"), |row| row.estimate.probability)
             .column("interval", ends)
-            .column("±", half_width)
             .columns(has(&|row| possible(row).is_some()).then_some("P possible"), three_digits, |row, _| possible(row))
             .columns(has(&|row| row.risk.per_hour.is_some()).then_some("per hour"), Column::from, |row, _| {
                 rate_text(row.risk.per_hour)
@@ -284,6 +288,9 @@ fn weight<V>(of: impl Fn(&WeightFigures) -> V) -> impl Fn(&EstimateRow) -> Optio
 fn three_digits(name: &'static str) -> Column {
     Column::from(name).digits(Digits::Significant(3))
 }
+
+/// Number of notes on the terminal.
+const MAX_NOTES: usize = 5;
 
 /// Heading of what a row may be used for.
 const USABLE: &str = "usable";

@@ -9,7 +9,7 @@ use super::sampling_tables::convergence_csv;
 use lanesweep_engine::Headway;
 use lanesweep_run::sampling::{Sample, SampleResult, proposal_text};
 use lanesweep_support::Result;
-use lanesweep_support::run_folder::{ResultFiles, Results};
+use lanesweep_support::run_folder::{ResultFiles, Results, TABLES};
 
 impl SampleReport {
     /// From a run and its result.
@@ -43,16 +43,17 @@ impl SampleReport {
     pub fn write(&self, mut results: Results, sample: &Sample, result: &SampleResult) -> Result<ResultFiles> {
         let (density, mut figures) = (&sample.density, Vec::new());
         if let Some(run) = &result.crude {
-            results.add("convergence.csv", convergence_csv(&run.convergence).as_bytes())?;
+            let numbers = format!("{TABLES}convergence.csv");
+            results.add(&numbers, convergence_csv(&run.convergence).as_bytes())?;
             let svg = convergence(density, &run.convergence, self.level()).svg();
-            figures.push(PageFigure::add_svg(&mut results, "convergence", &svg, "convergence.csv")?);
+            figures.push(PageFigure::add_svg(&mut results, "convergence", &svg, &numbers)?);
         }
         if let Some(proposal) = &result.proposal {
             results.add("proposal.json", proposal_text(density, proposal)?.as_bytes())?;
         }
         results.add("density.json", &density.to_json()?)?;
         if let Some(figure) = self.headways_figure() {
-            figures.insert(0, PageFigure::add(&mut results, "headways", &figure)?);
+            figures.insert(0, PageFigure::add(&mut results, "headways", &figure, false)?);
         }
         results.add("estimates.csv", self.csv().as_bytes())?;
         results.add("report.html", self.html(figures).as_bytes())?;

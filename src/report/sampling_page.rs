@@ -7,7 +7,7 @@ use lanesweep_engine::Headway;
 use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::ModelId;
 use lanesweep_run::sampling::EstimateRow;
-use lanesweep_support::readable::{count, count_of, value};
+use lanesweep_support::readable::{count, count_of, significant, value};
 
 impl SampleReport {
     /// `report.html`, with the figures of the run.
@@ -28,7 +28,8 @@ impl SampleReport {
         Page {
             title: format!("Probability of failure: {}", self.name()),
             lead: format!(
-                "{} samples of a density over {} mined scenarios, estimator {}, profile {}. {}",
+                "{}{} samples of a density over {} mined scenarios, estimator {}, profile {}. {}",
+                self.sentence(),
                 count(drawn),
                 count_of(density.kernels),
                 match self.has_rare() {
@@ -48,6 +49,21 @@ impl SampleReport {
     /// `cut-in 2`.
     fn name(&self) -> String {
         format!("{} {}", self.density.category.label(), self.density.parameterization)
+    }
+
+    /// The largest probability of a collision, or of another criterion.
+    fn sentence(&self) -> String {
+        let rows = || self.estimates.iter().filter(|row| row.is_told(&self.estimates));
+        let by = |a: &&EstimateRow, b: &&EstimateRow| a.estimate.probability.total_cmp(&b.estimate.probability);
+        let collisions = rows().filter(|row| row.criterion == Criterion::Collision).max_by(by);
+        let Some(row) = collisions.or_else(|| rows().max_by(by)) else { return String::new() };
+        let [p, low, high] = [row.estimate.probability, row.estimate.interval.low, row.estimate.interval.high];
+        let [p, low, high] = [p, low, high].map(|share| significant(100.0 * share, 2));
+        let (model, criterion) = (row.model.name(), row.criterion.label());
+        format!(
+            "Highest: {model} fails {criterion} at headway {} in {p} % [{low} {high}] of the scenarios. ",
+            row.headway
+        )
     }
 
     fn estimates_section(&self) -> Section {

@@ -135,14 +135,15 @@ impl SampleReport {
             let (low, high) =
                 (format!("{:.1}", (low * 10.0).floor() / 10.0), format!("{:.1}", (high * 10.0).floor() / 10.0));
             let range = if low == high { low } else { format!("{low} to {high}") };
-            remarks.push((
+            let about = (
                 counted(few.len(), "row"),
                 format!(
                     "the failures come from effectively {range} scenarios; with fewer than {}, other recordings would give \
                      another probability, and nothing tells how much so",
                     Warning::MIN_SCENARIOS
                 ),
-            ));
+            );
+            remarks.insert(0, about);
         }
         remarks
     }
@@ -156,16 +157,12 @@ impl SampleReport {
 
     /// How to read the estimates, one sentence after the other.
     pub(super) fn rules(&self) -> impl Iterator<Item = String> {
-        [
-            self.mean_rule(),
-            self.traffic_rule(),
-            self.exposure_rule(),
-            self.sources_rule(),
-            self.recorded_rule(),
-            self.tail_rule(),
-        ]
-        .into_iter()
-        .flatten()
+        self.cautions().chain(self.sources_rule()).chain(self.recorded_rule())
+    }
+
+    /// Those of them without which a number is taken for another.
+    pub(super) fn cautions(&self) -> impl Iterator<Item = String> {
+        [self.traffic_rule(), self.tail_rule(), self.exposure_rule(), self.mean_rule()].into_iter().flatten()
     }
 
     /// What P over all headways averages; `None` for a single headway.
@@ -173,8 +170,7 @@ impl SampleReport {
         let is_mean = self.estimates.iter().any(|row| row.headway == "all");
         is_mean.then(|| {
             format!(
-                "THW all {}: P is the mean over {}; every sample runs from each of them, and each counts the same; every \
-                 headway of its own is in estimates.csv",
+                "THW all {}: P is the mean over {}, each counting the same; estimates.csv has every one",
                 self.headways.len(),
                 self.headways.join(", ")
             )
@@ -205,8 +201,7 @@ impl SampleReport {
     /// Why there is no rate per hour; `None` if the density draws the headway.
     fn exposure_rule(&self) -> Option<String> {
         (!self.plan_headways.is_empty()).then(|| {
-            "No rate per hour or per 1000 km: the headways are imposed, not observed; a density fitted with the headway as a \
-             parameter (`with_thw`) draws them and has one"
+            "No rate per hour or per 1000 km: the headways are imposed; a density fitted `with_thw` draws them and has one"
                 .to_owned()
         })
     }

@@ -5,9 +5,7 @@ use super::host::{Host, SweepRecord, Timings};
 use super::html::PageFigure;
 use super::plot::Figure;
 use super::records::{PROGRAM, document, publish, record};
-use super::study_figures::{
-    distributions, f1_by_parameters, f1_intervals, headways, modes, radar, recall_and_precision,
-};
+use super::study_figures::{f1_intervals, headways, radar};
 use super::tables;
 use lanesweep_engine::{ENGINE_VERSION, Headway, Partial, SweepSummary};
 use lanesweep_model::criterion::Criterion;
@@ -17,7 +15,7 @@ use lanesweep_model::scenario::parameterization::Parameterization;
 use lanesweep_run::score::{Best, CategoryScores, Misfit, ScoreTable, f1, published_failures, published_lvd_f1};
 use lanesweep_run::study::{ReferenceComparison, Study, StudyEvaluation, StudyProvenance};
 use lanesweep_support::Result;
-use lanesweep_support::run_folder::{ResultFiles, Results};
+use lanesweep_support::run_folder::{ResultFiles, Results, TABLES};
 use lanesweep_support::table::{Column, Digits, Table};
 use serde::Serialize;
 
@@ -98,36 +96,32 @@ impl<'a> StudyReport<'a> {
         }
     }
 
-    /// Writes CSV tables, figures, the files already in `results` and `run.json` to the folder; returns their names
-    /// without the record's.
+    /// Writes CSV tables, figures (plain ones without title and caption), the files already in `results` and `run.json` to
+    /// the folder; returns their names without the record's.
     ///
     /// # Errors
     /// [`lanesweep_support::Error::Io`].
-    pub fn write(&self, mut results: Results) -> Result<ResultFiles> {
+    pub fn write(&self, mut results: Results, is_plain: bool) -> Result<ResultFiles> {
         let data = if self.facts().synthetic { "synthetic" } else { "recorded" };
-        results.add("failures.csv", tables::failure_records(&self.evaluation.scores, data)?.csv().as_bytes())?;
-        results.add("f1.csv", tables::f1_records(&self.evaluation.scores, data).csv().as_bytes())?;
-        results.add("claims.csv", tables::claim_records(&self.evaluation.claims, data).csv().as_bytes())?;
-        results.add("headways.csv", self.headways(data).csv().as_bytes())?;
+        results.add("results.csv", tables::result_records(&self.evaluation, data)?.csv().as_bytes())?;
+        let mut table = |name: &str, table: Table| results.add(&format!("{TABLES}{name}.csv"), table.csv().as_bytes());
+        table("claims", tables::claim_records(&self.evaluation.claims, data))?;
+        self.given_table().map_or(Ok(()), |given| table("variants", given))?;
+        if self.facts().categories.iter().any(|of| !of.folds.is_empty()) {
+            let folds = self.facts().categories.iter().flat_map(|of| &of.folds);
+            let folds = Table::of(folds).column("id", |(id, _)| id.as_str()).column("fold", |(_, fold)| *fold);
+            table("folds", folds.build())?;
+        }
+        self.comparison.as_ref().map_or(Ok(()), |of| table("reference", tables::reference_table(of)))?;
         let mut figures = Vec::new();
         for (at, scores) in self.evaluation.scores.categories.iter().enumerate() {
             // `radar-cut-in.svg`.
             let category = scores.category.key().replace('_', "-");
             let drawn = self.figures(at).into_iter();
-            let added =
-                drawn.map(|(name, figure)| PageFigure::add(&mut results, &format!("{name}-{category}"), &figure));
-            figures.push(added.collect::<Result<Vec<_>>>()?);
-        }
-        if let Some(given) = self.given_table() {
-            results.add("variants.csv", given.csv().as_bytes())?;
-        }
-        if self.facts().categories.iter().any(|of| !of.folds.is_empty()) {
-            let folds = self.facts().categories.iter().flat_map(|of| &of.folds);
-            let table = Table::of(folds).column("id", |(id, _)| id.as_str()).column("fold", |(_, fold)| *fold);
-            results.add("folds.csv", table.build().csv().as_bytes())?;
-        }
-        if let Some(comparison) = &self.comparison {
-            results.add("reference.csv", tables::reference_table(comparison).csv().as_bytes())?;
+            let add = |(name, figure): (&str, Figure)| {
+                PageFigure::add(&mut results, &format!("{name}-{category}"), &figure, is_plain)
+            };
+            figures.push(drawn.map(add).collect::<Result<Vec<_>>>()?);
         }
         results.add("report.html", self.html(figures).as_bytes())?;
         publish(results, |files| self.json(files))
@@ -140,38 +134,22 @@ impl<'a> StudyReport<'a> {
         if scores.variants.len() > 1 {
             figures.push(("f1", f1_intervals(scores, confidence, data)));
             figures.push(("radar", radar(scores, data)));
-            figures.push(("recall-precision", recall_and_precision(scores, confidence, data)));
         }
         let numbers = &self.evaluation.categories[at];
-        let Some(facts) = self.facts().categories.get(at) else { return figures };
-        if scores.variants.len() > 1 {
-            figures.push(("f1-by-parameters", f1_by_parameters(scores, &numbers.means, confidence, data)));
-        }
         figures.extend(headways(&numbers.headways, scores, confidence, data).map(|figure| ("headways", figure)));
-        if !facts.parameters.is_empty() {
-            figures.push(("parameters", distributions(scores.category, &facts.parameters, data)));
-        }
-        if !facts.modes.is_empty() {
-            figures.push(("modes", modes(scores.category, &facts.modes, &facts.svd_explained, data)));
-        }
         figures
     }
+}
 
-    /// Failures of every variant by headway.
-    fn headways(&self, data: &str) -> Table {
-        let categories = self.evaluation.scores.categories.iter().zip(&self.evaluation.categories);
-        let rows = categories.flat_map(|(scores, numbers)| numbers.headways.rows().map(move |row| (scores, row)));
-        Table::of(rows)
-            .column("category", |(scores, _)| scores.category.key())
-            .column("variant", |(_, (variant, ..))| variant)
-            .column("headway", |(_, (_, headway, ..))| headway.to_string())
-            .column("model", |(_, (_, _, model, ..))| model.name())
-            .column("criterion", |(_, (.., criterion, _))| criterion.key())
-            .column("failures", |(_, (.., failures))| failures)
-            .column("scenarios", |(scores, _)| scores.scenarios)
-            .column("data", |_| data)
-            .build()
-    }
+/// Runs of S of a driver model that were undecided at the time cap.
+#[derive(Serialize)]
+pub(super) struct CappedRecord {
+    /// Driver model.
+    pub model: &'static str,
+    /// How many.
+    pub runs: u64,
+    /// Smallest TTC among them, s; null if none approaches.
+    pub min_ttc_s: Option<f64>,
 }
 
 /// Found and kept scenarios of a category, and counts of their lanes.
@@ -189,6 +167,8 @@ pub(super) struct CategoryRecord<'a> {
     pub lanes: u64,
     /// Lanes that ended at the time cap.
     pub capped_lanes: u64,
+    /// Those of S, by driver model.
+    pub capped_s: Vec<CappedRecord>,
     /// Cells of the score table whose F1 is 0/0.
     pub undefined_f1: u64,
     /// Cumulative explained variance of the decomposition's first coefficients, if there is one.
@@ -247,10 +227,17 @@ impl StudyReport<'_> {
     /// Found and kept scenarios, and lanes, of each category.
     pub(super) fn categories(&self) -> Vec<CategoryRecord<'_>> {
         let plan = self.study.plan();
-        let blocks = plan.blocks.iter().zip(&self.study.facts().categories);
-        let records = blocks.map(|(block, of)| {
+        let blocks = plan.blocks.iter().zip(&self.study.facts().categories).enumerate();
+        let records = blocks.map(|(at, (block, of))| {
             let scored = self.evaluation.scores.categories.iter().find(|c| c.category == block.category);
             let cells = scored.iter().flat_map(|c| &c.cells).filter(|c| c.variant > 0);
+            let numbers = self.evaluation.categories.get(at);
+            let capped = |(model, runs): (usize, u64)| CappedRecord {
+                model: plan.models[model].name(),
+                runs,
+                min_ttc_s: numbers.and_then(|of| of.capped_min_ttc_s[model]).filter(|ttc_s| ttc_s.is_finite()),
+            };
+            let of_s = scored.iter().flat_map(|c| c.capped.iter().copied().take(plan.models.len()).enumerate());
             CategoryRecord {
                 category: block.category,
                 found: of.found,
@@ -258,6 +245,7 @@ impl StudyReport<'_> {
                 variants: &block.variants,
                 lanes: plan.lanes_per_unit(block) * block.units.len(),
                 capped_lanes: scored.map_or(0, |c| c.capped.iter().sum()),
+                capped_s: of_s.map(capped).filter(|of| of.runs > 0).collect(),
                 undefined_f1: cells.filter(|c| f1(&c.counts).is_none()).count() as u64,
                 svd_explained: &of.svd_explained,
                 folds: of.folds.iter().map(|(_, fold)| fold + 1).max(),
@@ -273,15 +261,16 @@ fn best(best: &Best) -> impl Serialize {
     record! {
         category: best.category.key(),
         criterion: Criterion::Collision.key(),
+        // Times as many scenarios; null: not with this data.
+        data_for_decision: best.data_for_decision,
         f1: score.map(|s| s.f1),
         f1_high: score.map(|s| s.interval.high),
         f1_low: score.map(|s| s.interval.low),
         failing_scenarios: best.failing_scenarios,
-        hidden: score.map(|s| s.hidden),
+        missed_collisions: score.map(|s| s.hidden),
         model: best.model.name(),
-        more_data: score.map(|s| s.more_data).filter(|times| times.is_finite()),
-        not_told_apart: score.map(|s| &s.rivals),
         s_failures: best.failures,
+        ties_with: score.map(|s| &s.rivals),
         variant: score.map(|s| &s.variant),
     }
 }

@@ -1,31 +1,32 @@
-//! The answer of a study on one terminal screen: the best parameterization, what it hides, and what the data do not
-//! show.
+//! The answer of a study on one terminal screen: the best parameterization, what it misses, and what the data do not show.
 
 use super::html::Section;
-use super::study::StudyReport;
-use super::study_figures::variant_name;
+use super::study::{CappedRecord, StudyReport};
+use super::study_figures::{short_name, variant_name};
 use super::tables::{reference_text, wrap};
+use lanesweep_engine::Headway;
+use lanesweep_model::scenario::Category;
 use lanesweep_run::score::Best;
-use lanesweep_support::readable::{count, count_of, counted};
+use lanesweep_support::readable::{count, count_of, counted, significant};
 use lanesweep_support::table::{NumberText, Table};
 
 /// Width of the screen in columns, and minimum width of a narrower one.
 const WIDTH: usize = 80;
 const MIN_WIDTH: usize = 40;
-/// Maximum number of rows of the table: with the lines around it and those on stderr, the screen has 24 lines.
+/// Maximum number of rows of the table.
 const MAX_ROWS: usize = 12;
 /// Maximum characters of a list of parameterizations.
-const LIST: usize = 14;
+const LIST: usize = 9;
 
-const HEADER: [&str; 7] = ["scenario", "driver", "best", "F1", "hides", "not told apart", "needs"];
+const HEADER: [&str; 7] = ["scenario", "driver", "best", "F1", "missed collisions", "ties with", "data for decision"];
 /// Index of the column with F1, or with the reason why it is missing.
 const SCORE: usize = 3;
 /// Columns of numbers.
 const NUMBERS: [usize; 2] = [4, 6];
 
 /// What the last columns say.
-const LEGEND: &str = "hides: colliding runs of S that the best lacks. not told apart: F1 within chance of the best's. \
-                      needs: times as many scenarios to tell, if F1 stays.";
+const LEGEND: &str = "Missed: collisions of S that the best does not show. Ties: F1 within chance of the best's; 2.0x: \
+                      twice the scenarios would tell, if F1 stays.";
 
 fn table(rows: &[[String; 7]]) -> Table {
     let words = Table::of(rows).columns(0..4, |at| HEADER[at], |row, at| row[at].as_str());
@@ -33,14 +34,13 @@ fn table(rows: &[[String; 7]]) -> Table {
 }
 
 impl StudyReport<'_> {
-    /// The answer in at most 20 lines of 80 columns, or fewer columns on a narrower terminal.
+    /// The answer in at most 26 lines of 80 columns, or fewer columns on a narrower terminal.
     pub fn answer(&self, width: usize) -> String {
         let width = width.clamp(MIN_WIDTH, WIDTH);
         let made_up = if self.facts().synthetic { ". No number here is a statement about real traffic." } else { "" };
         let mut lines = vec![
             wrap(&format!("{}{made_up}", self.facts().data), width),
             wrap(&self.size(), width),
-            String::new(),
             wrap(&self.question(), width),
         ];
         lines.extend(self.rows(width));
@@ -49,7 +49,10 @@ impl StudyReport<'_> {
                 .iter()
                 .filter_map(|comparison| Some(wrap(reference_text(comparison).lines().next()?, width))),
         );
-        lines.push(wrap(LEGEND, width));
+        let has_best = self.evaluation.best.iter().any(|best| best.score.is_some());
+        let legend = if has_best { format!("{LEGEND} ") } else { String::new() };
+        lines.push(wrap(&format!("{legend}{}", self.conditions()), width));
+        lines.push(wrap(self.next(), width));
         lines.join("\n") + "\n"
     }
 
@@ -57,33 +60,113 @@ impl StudyReport<'_> {
     pub(super) fn answer_section(&self) -> Section {
         let named = |best: &Best| {
             let mut row = self.row(best);
+            // An interval stays on one line.
+            if best.score.is_some() {
+                row[SCORE] = row[SCORE].replace(' ', "\u{a0}");
+            }
             best.score.iter().for_each(|score| row[2] = variant_name(best.category, &score.variant));
             row
         };
+        // On a narrow screen a name would push the number out.
+        const ORDER: [usize; 7] = [0, 1, 3, 2, 4, 5, 6];
         let rows: Vec<[String; 7]> = self.evaluation.best.iter().map(named).collect();
-        let intro = format!("{}. {LEGEND}", self.size());
-        Section::new("answer", "").intro(intro).tables([table(&rows).captioned(self.question())])
+        let intro = format!("{}. {LEGEND} {}", self.size(), self.conditions());
+        let words = Table::of(&rows).columns(0..4, |at| HEADER[ORDER[at]], |row, at| row[ORDER[at]].as_str());
+        let table = words.columns(4..7, |at| HEADER[at], |row, at| NumberText(row[at].clone())).build();
+        Section::new("answer", "").intro(intro).tables([table.captioned(self.question())])
+    }
+
+    /// The answer in a sentence: by category the parameterization that is best for most drivers.
+    pub(super) fn sentence(&self) -> String {
+        let best = &self.evaluation.best;
+        let of_category = |of: &[Best]| {
+            let names: Vec<&str> =
+                of.iter().filter_map(|best| best.score.as_ref()).map(|score| score.variant.as_str()).collect();
+            let times = |name: &str| names.iter().filter(|other| **other == name).count();
+            // The first of equals.
+            let most = names.iter().rev().max_by_key(|name| times(name));
+            let answer = most.map_or("too few collisions to tell".to_owned(), |name| {
+                format!(
+                    "{} (best for {} of {})",
+                    variant_name(of[0].category, name),
+                    times(name),
+                    counted(of.len(), "driver")
+                )
+            });
+            format!("{}: {answer}", of[0].category.label())
+        };
+        let answers: Vec<String> = best.chunk_by(|a, b| a.category == b.category).map(of_category).collect();
+        format!("S' that keeps the collisions of S best, {}.", answers.join("; "))
     }
 
     fn size(&self) -> String {
         let kinds =
             self.evaluation.scores.categories.iter().map(|c| format!("{} {}s", count(c.scenarios), c.category.label()));
         format!(
-            "{}; {}, {}: {} lanes",
+            "{}; {}, {}{}: {} runs",
             kinds.collect::<Vec<_>>().join(", "),
             self.headways_in_words(),
             counted(self.evaluation.scores.categories.first().map_or(0, |c| c.models.len()), "driver"),
+            match self.study.plan().profile.name.as_str() {
+                "paper" => String::new(),
+                name => format!(", profile {name}"),
+            },
             count(self.lanes())
         )
     }
 
     fn question(&self) -> String {
-        let level = 100.0 * self.evaluation.scores.options.confidence;
-        format!("Which S' collides where S, as recorded, collides? F1 with its {level} % interval:")
+        let scores = &self.evaluation.scores;
+        let level = 100.0 * scores.options.confidence;
+        let (is_fitted, is_held_out) = scores.categories.iter().fold((false, false), |(fitted, held_out), of| {
+            let is_fitted =
+                of.judged().iter().any(|at| variant_name(of.category, &of.variants[*at]).ends_with("in sample"));
+            (fitted || is_fitted, held_out || of.is_cross_validated())
+        });
+        let judged = match (is_fitted, is_held_out) {
+            (true, _) => " (SVD in sample)",
+            (_, true) => " on scenarios that no fit has seen",
+            _ => "",
+        };
+        format!("Which S' collides where S does? F1 [{level} %]{judged}:")
     }
 
+    /// How far S is as recorded, and what its undecided runs may hide.
+    fn conditions(&self) -> String {
+        let scores = &self.evaluation.scores;
+        let has_lvd = scores.categories.iter().any(|of| of.category == Category::Lvd);
+        let mut text = match Headway::is_observed(&scores.headways) {
+            true => "S is as recorded.".to_owned(),
+            false => {
+                "S is as recorded, but for the imposed gap".to_owned()
+                    + if has_lvd { " and, in LVDs, the ego's speed." } else { "." }
+            }
+        };
+        let categories = self.categories();
+        let capped: Vec<&CappedRecord> = categories.iter().flat_map(|of| &of.capped_s).collect();
+        let runs: u64 = capped.iter().map(|of| of.runs).sum();
+        if runs > 0 {
+            let least = capped.iter().filter_map(|of| of.min_ttc_s).reduce(f64::min);
+            let least = least
+                .map_or("none approaches".to_owned(), |s| format!("their smallest TTC is {} s", significant(s, 2)));
+            let cap_s = self.study.plan().profile.frame.time_cap_s;
+            text += &format!(" {} runs of S were undecided after {cap_s} s; {least}.", count(runs));
+        }
+        text
+    }
+
+    /// What to do next.
+    fn next(&self) -> &'static str {
+        match self.facts().synthetic {
+            true => "Next, on your own recordings: lanesweep tracks DIR; lanesweep study DIR",
+            false => "Next, how likely a failure is: lanesweep fit on the same data, then lanesweep sample",
+        }
+    }
+
+    /// A head and the drivers' lines for each category.
     fn rows(&self, screen: usize) -> Vec<String> {
-        let known: Vec<[String; 7]> = self.evaluation.best.iter().take(MAX_ROWS).map(|best| self.row(best)).collect();
+        let shown = &self.evaluation.best[..self.evaluation.best.len().min(MAX_ROWS)];
+        let known: Vec<[String; 7]> = shown.iter().map(|best| self.row(best)).collect();
         let header = HEADER.map(str::to_owned);
         let is_sentence = |row: &[String; 7], at: usize| at == SCORE && row[SCORE + 1].is_empty();
         let width = |at: usize| {
@@ -91,13 +174,14 @@ impl StudyReport<'_> {
             cells.map(|row| row[at].chars().count()).max().unwrap_or(0)
         };
         let widths: [usize; 7] = std::array::from_fn(width);
+        // The category has a line of its own.
         let line = |row: &[String; 7]| {
             let (mut line, mut end) = (String::new(), 0);
-            for (at, cell) in row.iter().enumerate() {
-                end += widths[at] + if at > 0 { 2 } else { 0 };
+            for (at, cell) in row.iter().enumerate().skip(1) {
+                end += widths[at] + if at > 1 { 2 } else { 0 };
                 let start = end - if NUMBERS.contains(&at) { cell.chars().count() } else { widths[at] };
                 // A sentence in place of an answer extends over the empty columns after it.
-                let gap = start.saturating_sub(line.chars().count()).max(if at > 0 { 2 } else { 0 });
+                let gap = start.saturating_sub(line.chars().count()).max(if at > 1 { 2 } else { 0 });
                 if !cell.is_empty() {
                     line += &" ".repeat(gap);
                     line += cell;
@@ -105,54 +189,58 @@ impl StudyReport<'_> {
             }
             line
         };
-        let mut lines: Vec<String> = std::iter::once(&header).chain(&known).map(line).collect();
-        if lines.iter().any(|line| line.chars().count() > screen) {
+        let mut lines = vec![line(&header)];
+        for of in shown.chunk_by(|a, b| a.category == b.category) {
+            let mut names: Vec<String> = Vec::new();
+            for score in of.iter().filter_map(|best| best.score.as_ref()) {
+                let name = variant_name(of[0].category, &score.variant);
+                if !names.contains(&name) {
+                    names.push(name);
+                }
+            }
+            names.sort();
+            let dash = if names.is_empty() { "" } else { " - " };
+            lines.push(wrap(&format!("{}{dash}{}", of[0].category.label(), names.join("; ")), screen));
+            lines.extend(of.iter().map(|best| line(&self.row(best))));
+        }
+        if lines.iter().flat_map(|text| text.lines()).any(|line| line.chars().count() > screen) {
             lines = table(&known).fitted(2, screen).lines().map(str::to_owned).collect();
         }
         let more = self.evaluation.best.len().saturating_sub(MAX_ROWS);
         if more > 0 {
-            lines.push(format!("… and {} more: f1.csv", count_of(more)));
+            lines.push(format!("… and {} more: results.csv", count_of(more)));
         }
         lines
     }
 
     fn row(&self, best: &Best) -> [String; 7] {
         let min_scenarios = u64::from(self.evaluation.scores.options.min_failures.max(1));
-        let name = [best.category.label(), best.model.name()].map(str::to_owned);
+        let needed = match best.data_for_decision {
+            None => "not with this data".to_owned(),
+            Some(1.0) => "-".to_owned(),
+            // Rounded up.
+            Some(times) if times >= 9.95 => format!("{:.0}x", times.ceil()),
+            Some(times) => format!("{:.1}x", (10.0 * times).ceil() / 10.0),
+        };
+        let [category, model] = [best.category.label(), best.model.name()].map(str::to_owned);
         let Some(score) = &best.score else {
             let scenarios = best.failing_scenarios;
-            let times = min_scenarios as f64 / scenarios as f64;
             let text = match scenarios {
                 0 => "S never collides: nothing to compare".to_owned(),
                 1 => format!("too few: 1 colliding scenario, {min_scenarios} needed"),
                 _ => format!("too few: {} colliding scenarios, {min_scenarios} needed", count(scenarios)),
             };
-            let needs = if scenarios == 0 { "-".to_owned() } else { factor(times) };
-            let [category, model] = name;
-            return [category, model, "-".to_owned(), text, String::new(), String::new(), needs];
+            return [category, model, "-".to_owned(), text, String::new(), String::new(), needed];
         };
         let interval = format!("{:.2} [{:.2} {:.2}]", score.f1, score.interval.low, score.interval.high);
-        let hidden = format!("{} of {}", count(score.hidden), count(best.failures));
-        let (rivals, needs) = match score.rivals.is_empty() {
-            true => ("-".to_owned(), "-".to_owned()),
-            false => (list(&score.rivals), factor(score.more_data)),
-        };
-        let [category, model] = name;
-        [category, model, score.variant.clone(), interval, hidden, rivals, needs]
+        let missed = format!("{} of {}", count(score.hidden), count(best.failures));
+        let ties = if score.rivals.is_empty() { "-".to_owned() } else { list(&score.rivals) };
+        [category, model, short_name(&score.variant).to_owned(), interval, missed, ties, needed]
     }
 }
 
 /// The names, as many as fit.
 fn list(names: &[String]) -> String {
-    let text = names.join(", ");
+    let text = names.iter().map(|name| short_name(name)).collect::<Vec<_>>().join(", ");
     if text.chars().count() <= LIST { text } else { format!("{} others", names.len()) }
-}
-
-/// `1.3x`, rounded up: how much more data is needed, or a text if the factor is unrealistic.
-fn factor(times: f64) -> String {
-    match times {
-        t if t >= 100.0 || t.is_nan() => ">100x".to_owned(),
-        t if t >= 9.95 => format!("{:.0}x", t.ceil()),
-        t => format!("{:.1}x", (10.0 * t).ceil() / 10.0),
-    }
 }

@@ -3,6 +3,7 @@
 use super::host::Timings;
 use super::html::{Page, PageFigure, Section};
 use super::study::StudyReport;
+use super::study_figures::validation;
 use super::tables;
 use lanesweep_model::scenario::parameterization::Parameterization;
 use lanesweep_run::score::{CategoryScores, ClaimVerdict, Misfit};
@@ -34,7 +35,7 @@ impl StudyReport<'_> {
         sections.extend(self.claims());
         sections.push(self.failures());
         sections.extend(self.given_table().map(|table| {
-            let intro = "-cv: each scenario is replayed by a basis that was fitted on the other folds (folds.csv): \
+            let intro = "-cv: each scenario is replayed by a basis that was fitted on the other folds (tables/folds.csv): \
                          whole recordings, or stretches of time if there are fewer recordings than folds.";
             Section::new("given", "Cross-validation and given S'").intro(intro).tables([table])
         }));
@@ -46,8 +47,9 @@ impl StudyReport<'_> {
         Page {
             title: "Parameterized against recorded scenarios".to_owned(),
             lead: format!(
-                "{} {} lanes: every scenario as recorded (S) and parameterized (S'), from {}, against {} \
+                "{} {} {} runs: every scenario as recorded (S) and parameterized (S'), from {}, against {} \
                  driver models, judged by collision, TTC and BTN under profile {}.",
+                self.sentence(),
                 sentence(&facts.data),
                 count(self.lanes()),
                 self.headways_in_words(),
@@ -67,7 +69,7 @@ impl StudyReport<'_> {
             .column("scenario", |category| category.category.label())
             .column("found", |category| category.found)
             .column("simulated", |category| category.kept)
-            .column("lanes", |category| category.lanes)
+            .column("runs", |category| category.lanes)
             .column("ended at the time cap", |category| category.capped_lanes)
             .column("F1 undefined (0/0)", |category| category.undefined_f1)
             .build()
@@ -117,11 +119,14 @@ impl StudyReport<'_> {
                 scores.scenarios, scores.simulations
             ))
             .tables([
-                tables::f1_scores(scores, self.facts().published)
-                    .captioned(format!("F1 with its {level} % interval over scenarios")),
+                tables::f1_scores(scores)
+                    .captioned(format!("F1 with its {level} % interval over scenarios{}", validation(scores))),
                 tables::share_table(scores).captioned("Recall / precision"),
-                variants_table(scores),
             ])
+            .tables(tables::f1_beside_published(scores).filter(|_| self.facts().published).map(|table| {
+                table.captioned("F1 beside the paper's: in sample, decompositions fitted on the scenarios they replay")
+            }))
+            .tables([variants_table(scores)])
             .figures(figures)
     }
 
@@ -132,7 +137,7 @@ impl StudyReport<'_> {
         let section = Section::new("claims", "The paper's claims on this data").intro(format!(
             "What de Gelder and Op den Camp found on highD, tested here. A cell holds or contradicts a claim where \
              the {level} % interval of its difference over scenarios excludes 0. {} Mean difference: over the \
-             cells that are judged. File: claims.csv.",
+             cells that are judged. File: tables/claims.csv.",
             ClaimVerdict::RULE
         ));
         (!table.rows.is_empty()).then(|| section.tables([table.captioned("Claims")]))

@@ -1,12 +1,15 @@
 //! The tables of a study: for people in the paper's layout, for files with one row per number.
 
+use super::study_figures::short_name;
+use lanesweep_engine::Headway;
 use lanesweep_model::criterion::Criterion;
+use lanesweep_model::scenario::Category;
 use lanesweep_model::scenario::parameterization::Parameterization;
 use lanesweep_run::score::{
-    CategoryScores, ClaimResult, ClaimVerdict, PublishedFailures, ScoreCell, ScoreInterval, ScoreTable, f1, precision,
-    published_failures, published_lvd_f1, recall,
+    CROSS_VALIDATED, CategoryScores, ClaimResult, ClaimVerdict, PublishedFailures, ScoreCell, ScoreInterval,
+    ScoreTable, f1, precision, published_failures, published_lvd_f1, recall,
 };
-use lanesweep_run::study::ReferenceComparison;
+use lanesweep_run::study::{ReferenceComparison, StudyEvaluation};
 use lanesweep_support::readable;
 pub use lanesweep_support::table::WIDTH;
 use lanesweep_support::table::{Column, Digits, NumberText, Table};
@@ -46,19 +49,28 @@ pub(super) fn failure_table(scores: &ScoreTable, published: bool) -> Table {
 }
 
 /// F1 per parameterization, model and criterion, with its interval.
-pub(super) fn f1_scores(scores: &CategoryScores, published: bool) -> Table {
-    let text = |s: &ScoreCell, variant: usize| {
-        let text = same(scores, s, variant).map_or("-".to_owned(), |c| f1_text(f1(&c.counts), c.f1_interval));
-        let theirs = published_lvd_f1(&scores.variants[variant], s.model, s.criterion).filter(|_| published);
-        NumberText(text + &theirs.map_or(String::new(), |theirs| format!("\npaper {theirs:.3}")))
-    };
-    per_variant(scores, Some("S fails"), text)
+pub(super) fn f1_scores(scores: &CategoryScores) -> Table {
+    per_variant(scores, scores.judged(), Some("S fails"), |s, variant| {
+        NumberText(same(scores, s, variant).map_or("-".to_owned(), |c| f1_text(f1(&c.counts), c.f1_interval)))
+    })
+}
+
+/// F1 in sample beside the paper's, which is in sample; without rows where the paper has none.
+pub(super) fn f1_beside_published(scores: &CategoryScores) -> Option<Table> {
+    let variants: Vec<usize> =
+        (1..scores.variants.len()).filter(|at| !scores.variants[*at].ends_with(CROSS_VALIDATED)).collect();
+    let theirs = |s: &ScoreCell, variant: usize| published_lvd_f1(&scores.variants[variant], s.model, s.criterion);
+    let table = per_variant(scores, variants, None, |s, variant| {
+        let own = same(scores, s, variant).and_then(|c| f1(&c.counts)).map_or("-".to_owned(), |f1| format!("{f1:.3}"));
+        NumberText(own + &theirs(s, variant).map_or(String::new(), |theirs| format!("\npaper {theirs:.3}")))
+    });
+    (scores.category == Category::Lvd).then_some(table)
 }
 
 /// Recall and precision per parameterization, model and criterion.
 pub(super) fn share_table(scores: &CategoryScores) -> Table {
     let share = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.3}"));
-    per_variant(scores, None, |s, variant| {
+    per_variant(scores, scores.judged(), None, |s, variant| {
         let both = |c: &ScoreCell| format!("{} / {}", share(recall(&c.counts)), share(precision(&c.counts)));
         NumberText(same(scores, s, variant).map_or("-".to_owned(), both))
     })
@@ -67,6 +79,7 @@ pub(super) fn share_table(scores: &CategoryScores) -> Table {
 /// A row per model and criterion, a column per parameterization, from the cells of S.
 fn per_variant(
     scores: &CategoryScores,
+    variants: Vec<usize>,
     fails: Option<&'static str>,
     text: impl Fn(&ScoreCell, usize) -> NumberText,
 ) -> Table {
@@ -74,7 +87,7 @@ fn per_variant(
         .column("model", |s| s.model.name())
         .column("criterion", |s| s.criterion.label())
         .columns(fails, |name| name, |s, _| s.counts.tp)
-        .columns(1..scores.variants.len(), |variant| scores.variants[variant].clone(), text)
+        .columns(variants, |variant| short_name(&scores.variants[variant]).to_owned(), text)
         .build()
 }
 
@@ -113,62 +126,85 @@ pub(super) fn claim_table(results: &[ClaimResult]) -> Table {
         .build()
 }
 
-/// Failures of S and S': one row per category, variant, model and criterion. `data` describes the swept data.
+/// A row of the table of results: a cell of the scores over all headways, or the failures at one.
+#[derive(Clone, Copy)]
+struct ResultRow<'a> {
+    scores: &'a CategoryScores,
+    cell: &'a ScoreCell,
+    /// `None`: all.
+    headway: Option<Headway>,
+    failures: u64,
+    simulations: u64,
+    /// Runs at the time cap; only over all headways.
+    capped: Option<u64>,
+}
+
+/// Everything that a study counts and scores: a row per category, variant, driver model, criterion and headway, and one over
+/// all headways. `data` describes the data.
 ///
 /// # Errors
 /// [`Error::Internal`] if there are fewer counts of capped lanes than cells.
-pub(super) fn failure_records(scores: &ScoreTable, data: &str) -> Result<Table> {
+pub(super) fn result_records(evaluation: &StudyEvaluation, data: &str) -> Result<Table> {
     let mut rows = Vec::new();
-    for category in &scores.categories {
-        for (at, cell) in category.cells.iter().enumerate() {
+    for (scores, numbers) in evaluation.scores.categories.iter().zip(&evaluation.categories) {
+        let of = &numbers.headways;
+        for (at, cell) in scores.cells.iter().enumerate() {
             // Cells are variant × model × criterion; these counts are variant × model.
-            let capped = category.capped.get(at / Criterion::ALL.len()).ok_or_else(|| {
-                let what = format!("{} of {}", cell.model.name(), category.variants[cell.variant]);
+            let capped = scores.capped.get(at / Criterion::ALL.len()).ok_or_else(|| {
+                let what = format!("{} of {}", cell.model.name(), scores.variants[cell.variant]);
                 Error::Internal(format!("no count of lanes at the time cap for {what}"))
             })?;
-            rows.push((category, cell, *capped));
+            let failures = cell.counts.tp + if cell.variant == 0 { 0 } else { cell.counts.fp };
+            let (simulations, capped) = (scores.simulations, Some(*capped));
+            rows.push(ResultRow { scores, cell, headway: None, failures, simulations, capped });
+            let model = at / Criterion::ALL.len() % scores.models.len();
+            rows.extend(of.headways.iter().enumerate().map(|(at, headway)| ResultRow {
+                headway: Some(*headway),
+                failures: of.count((cell.variant, at, model, cell.criterion)),
+                simulations: scores.scenarios,
+                capped: None,
+                scores,
+                cell,
+            }));
         }
     }
-    let failures = |cell: &ScoreCell| cell.counts.tp + if cell.variant == 0 { 0 } else { cell.counts.fp };
+    // Scores need S and S' of one run, whose pairs are counted over all headways.
+    let score = |row: ResultRow<'_>| (row.cell.variant > 0 && row.headway.is_none()).then_some(row.cell.clone());
+    let counts = |row: ResultRow<'_>| score(row).map(|cell| cell.counts);
+    let interval = |row: ResultRow<'_>| score(row).and_then(|cell| cell.f1_interval);
     Ok(Table::of(rows)
-        .column("category", |(category, ..)| category.category.key())
-        .column("variant", |(category, cell, _)| category.variants[cell.variant].as_str())
-        .column("model", |(_, cell, _)| cell.model.name())
-        .column("criterion", |(_, cell, _)| cell.criterion.key())
-        .column("failures", |(_, cell, _)| failures(cell))
-        .column("simulations", |(category, ..)| category.simulations)
-        .column("capped", |(.., capped)| capped)
+        .column("category", |row| row.scores.category.key())
+        .column("variant", |row| row.scores.variants[row.cell.variant].as_str())
+        .column("model", |row| row.cell.model.name())
+        .column("criterion", |row| row.cell.criterion.key())
+        .column("headway", |row| row.headway.map_or("all".to_owned(), |headway| headway.to_string()))
+        .column("parameters", |row| known(row).map(|found| found.parameter_count()))
+        .column("fit", |row| match known(row).and_then(|found| found.coefficients()) {
+            Some(_) if row.scores.variants[row.cell.variant].ends_with(CROSS_VALIDATED) => "cross-validated",
+            Some(_) => "in sample",
+            None => "",
+        })
+        .column("simulations", |row| row.simulations)
+        .column("failures", |row| row.failures)
+        .column("capped", |row| row.capped)
+        .column("tp", |row| counts(row).map(|of| of.tp))
+        .column("fn", |row| counts(row).map(|of| of.fn_))
+        .column("fp", |row| counts(row).map(|of| of.fp))
+        .column("tn", |row| counts(row).map(|of| of.tn))
+        .column("recall", |row| counts(row).and_then(|of| recall(&of)))
+        .column("precision", |row| counts(row).and_then(|of| precision(&of)))
+        .column("f1", |row| counts(row).and_then(|of| f1(&of)))
+        .column("f1_low", |row| interval(row).map(|of| of.low))
+        .column("f1_high", |row| interval(row).map(|of| of.high))
+        .column("f1_no_interval", |row| score(row).map_or("", |cell| no_interval(&cell)))
+        .column("failing_scenarios", |row| row.headway.is_none().then_some(row.cell.failing_scenarios))
         .column("data", |_| data)
         .build())
 }
 
-/// Scores: one row per category, parameterization, model and criterion.
-pub(super) fn f1_records(scores: &ScoreTable, data: &str) -> Table {
-    let rows = scores.categories.iter().flat_map(|category| {
-        let cells = category.cells.iter().filter(|cell| cell.variant > 0);
-        cells.map(|cell| (category.category, category.variants[cell.variant].as_str(), cell))
-    });
-    Table::of(rows)
-        .column("category", |(category, ..)| category.key())
-        .column("variant", |(_, name, _)| name)
-        .column("parameters", |(category, name, _)| {
-            Parameterization::find(category, name).map(|found| found.parameter_count())
-        })
-        .column("model", |(.., cell)| cell.model.name())
-        .column("criterion", |(.., cell)| cell.criterion.key())
-        .column("tp", |(.., cell)| cell.counts.tp)
-        .column("fn", |(.., cell)| cell.counts.fn_)
-        .column("fp", |(.., cell)| cell.counts.fp)
-        .column("tn", |(.., cell)| cell.counts.tn)
-        .column("recall", |(.., cell)| recall(&cell.counts))
-        .column("precision", |(.., cell)| precision(&cell.counts))
-        .column("f1", |(.., cell)| f1(&cell.counts))
-        .column("f1_low", |(.., cell)| cell.f1_interval.map(|interval| interval.low))
-        .column("f1_high", |(.., cell)| cell.f1_interval.map(|interval| interval.high))
-        .column("f1_no_interval", |(.., cell)| no_interval(cell))
-        .column("failing_scenarios", |(.., cell)| cell.failing_scenarios)
-        .column("data", |_| data)
-        .build()
+/// The parameterization of a row; `None` for S and those of other programs.
+fn known(row: ResultRow) -> Option<Parameterization> {
+    Parameterization::find(row.scores.category, short_name(&row.scores.variants[row.cell.variant]))
 }
 
 /// Why F1 has no interval; empty if it has one.

@@ -6,7 +6,8 @@
 //! is removed. Then the results are renamed, the record last, and the list is complete. After a kill in between, the
 //! next run removes the listed files that it does not write itself. Readers of recordings refuse an incomplete folder.
 //!
-//! Parts of a run use the folder together and exclude whole runs: `parts`.
+//! Parts of a run use the folder together and exclude whole runs: `parts`. What one opens lies in the folder itself, the
+//! rest in [`TABLES`] and [`FIGURES`] below it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{ErrorKind, Write};
@@ -27,6 +28,12 @@ const LOCK: &str = "run.lock";
 const PLAN: &str = "plan.json";
 const WORK: [&str; 3] = [".lock", ".journal", "search.json"];
 
+/// Folders of tables and of figures in that of a run.
+pub const TABLES: &str = "tables/";
+/// See [`TABLES`].
+pub const FIGURES: &str = "figures/";
+const INNER: [&str; 2] = [TABLES, FIGURES];
+
 /// The content of [`LIST`].
 #[derive(Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -44,7 +51,10 @@ impl FileList {
     fn read(dir: &Path) -> Option<FileList> {
         let text = input_file::read(&dir.join(LIST), input_file::MAX_TABLE_BYTES).ok()?;
         let list: FileList = serde_json::from_slice(&text).ok()?;
-        let is_plain = |name: &str| file_name(Path::new(name)) == name && !name.starts_with('.');
+        let is_plain = |name: &str| {
+            let name = INNER.iter().find_map(|inner| name.strip_prefix(inner)).unwrap_or(name);
+            file_name(Path::new(name)) == name && !name.starts_with('.')
+        };
         list.files.iter().all(|(name, _)| is_plain(name)).then_some(list)
     }
 
@@ -99,7 +109,16 @@ impl RunFolder {
         let folder = RunFolder { dir: dir.to_path_buf(), record, is_new, lock, live };
         refuse_link(&dir.join(LIST))?;
         clear_stale(dir, None);
+        INNER.iter().for_each(|inner| clear_stale(&dir.join(inner), None));
+        folder.remove_empty();
         Ok(folder)
+    }
+
+    /// Removes folders of tables and figures without any.
+    fn remove_empty(&self) {
+        for inner in INNER {
+            let _ = std::fs::remove_dir(self.dir.join(inner.trim_end_matches('/')));
+        }
     }
 
     /// Path of the folder.
@@ -128,7 +147,15 @@ impl RunFolder {
             let entries = entries.map_err(|e| if e.kind() == ErrorKind::NotFound { vanished() } else { e });
             let entries = entries.map_err(|e| Error::io(&self.dir, "read", e))?;
             let names = entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned());
-            let is_work = |name: &String| name.starts_with('.') || WORK.iter().any(|end| name.ends_with(end));
+            // Hidden files are ours; so is a folder of tables or figures with nothing else.
+            let is_hidden = |name: &str| name.starts_with('.');
+            let holds_hidden = |name: &str| {
+                let entries = || std::fs::read_dir(self.dir.join(name)).into_iter().flatten().flatten();
+                INNER.iter().any(|inner| inner.trim_end_matches('/') == name)
+                    && entries().all(|entry| is_hidden(&entry.file_name().to_string_lossy()))
+            };
+            let is_work =
+                |name: &String| is_hidden(name) || holds_hidden(name) || WORK.iter().any(|end| name.ends_with(end));
             return match names.filter(|name| !is_work(name)).min() {
                 Some(name) if !self.dir.join(PLAN).exists() => {
                     Err(self.refusal(&format!("it holds {name} and no {LIST}")))
@@ -160,6 +187,7 @@ impl RunFolder {
 
 impl Drop for RunFolder {
     fn drop(&mut self) {
+        self.remove_empty();
         self.live = None;
         self.lock = None;
         if self.is_new {
@@ -208,6 +236,14 @@ impl Results<'_> {
     /// As [`Results::add`].
     pub fn add_with(&mut self, name: &str, produce: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
         let path = self.folder.dir.join(name);
+        if let Some(inner) = INNER.iter().find(|inner| name.starts_with(**inner)) {
+            let inner = self.folder.dir.join(inner.trim_end_matches('/'));
+            // A link would lead elsewhere.
+            if inner.symlink_metadata().is_ok_and(|about| !about.is_dir()) {
+                refuse_link(&inner)?;
+            }
+            make_folder(&inner)?;
+        }
         let mut file = AtomicFile::create_inside(&path)?;
         produce(&mut file).map_err(|e| Error::io(&path, "write", e))?;
         let file = file.stage()?.closed();
@@ -279,7 +315,7 @@ impl Results<'_> {
         self.elsewhere.into_iter().try_for_each(StagedFile::publish)?;
         let last = self.staged.pop();
         self.staged.into_iter().try_for_each(|(_, file)| file.place())?;
-        sync_folder(dir);
+        [dir.clone()].into_iter().chain(INNER.map(|inner| dir.join(inner))).for_each(|dir| sync_folder(&dir));
         last.map_or(Ok(()), |(_, file)| file.publish())?;
         list.write(dir)
     }

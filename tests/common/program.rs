@@ -97,7 +97,16 @@ pub fn send(signal: &str, pid: u32) {
 /// Names of a folder's entries; none where there is no folder.
 pub fn names(dir: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(dir).into_iter().flatten().flatten();
-    entries.map(|entry| entry.file_name().into_string().unwrap()).collect()
+    let name = |entry: std::fs::DirEntry| entry.file_name().into_string().unwrap();
+    entries
+        .flat_map(|entry| match entry.path().is_dir() {
+            true => names(&entry.path())
+                .into_iter()
+                .map(|inner| format!("{}/{inner}", entry.file_name().display()))
+                .collect(),
+            false => vec![name(entry)],
+        })
+        .collect()
 }
 
 /// Names and content of files.

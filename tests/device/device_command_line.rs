@@ -28,8 +28,7 @@ fn a_study_on_a_device_writes_the_same_files_as_on_the_cpu() {
     let on_cpu = study("cpu", "--backend cpu");
     assert!(on_cpu == study("device", &format!("--backend gpu --device {device}")), "the tables differ");
     let mut files = 0;
-    for entry in std::fs::read_dir(dir.path().join("cpu")).unwrap() {
-        let name = entry.unwrap().file_name();
+    for name in common::program::names(&dir.path().join("cpu")) {
         let read = |folder: &str| std::fs::read(dir.path().join(folder).join(&name)).unwrap();
         if name == "run.json" {
             let record = json(&dir.path().join("device/run.json"));
@@ -44,7 +43,7 @@ fn a_study_on_a_device_writes_the_same_files_as_on_the_cpu() {
             assert!(parts[0] == parts[1] && page("device").contains("exact path"));
         } else if name != "lanesweep-files.json" {
             // The list has the checksums of record and page.
-            assert!(read("cpu") == read("device"), "{}", name.display());
+            assert!(read("cpu") == read("device"), "{name}");
             files += 1;
         }
     }

@@ -113,9 +113,10 @@ fn the_best_of_equals_is_the_first_and_no_data_tells_it_from_the_others() {
     let counts = part(&plan, 0..60, &twins);
     let table = score(&plan, &counts, &ScoreOptions::default()).unwrap();
     for best in best_parameterizations(&table, &plan, &counts, Criterion::Ttc) {
+        assert_eq!(best.data_for_decision, None, "no data does");
         let score = best.score.unwrap();
         assert_eq!((score.variant.as_str(), &score.rivals[..]), ("iii", &["iv".to_owned(), "v".to_owned()][..]));
-        assert!(score.more_data.is_infinite() && score.interval.low < score.f1);
+        assert!(score.interval.low < score.f1);
     }
 }
 
@@ -127,9 +128,11 @@ fn a_best_parameterization_needs_ten_failing_scenarios() {
         let counts = part(&plan, 0..60, &lane);
         let table = score(&plan, &counts, &ScoreOptions::default()).unwrap();
         let best = best_parameterizations(&table, &plan, &counts, Criterion::Collision).swap_remove(0);
-        (best.failures, best.failing_scenarios, best.score.is_some())
+        (best.failures, best.failing_scenarios, best.score.is_some(), best.data_for_decision)
     };
-    assert_eq!((best(9), best(10)), ((90, 9, false), (100, 10, true)));
+    assert_eq!(best(8), (80, 8, false, Some(1.25)));
+    assert_eq!(best(0), (0, 0, false, None), "no data of this kind");
+    assert_eq!((best(9).2, best(10).2), (false, true));
 }
 
 #[test]

@@ -219,13 +219,14 @@ fn every_printed_command_has_a_verb_and_flags_that_exist() {
 const OF_ROWS: &str = "rare-failures.svg";
 
 /// Figures of the book: file, the command that draws it, and where; `LANESWEEP_RENEW_FIGURES=1` draws them anew.
-const FIGURES: [(&str, &str, &str); 3] = [
-    ("f1-cut-in.svg", "study --out OUT", "f1-cut-in.svg"),
+const FIGURES: [(&str, &str, &str); 4] = [
+    ("f1-one-driver.svg", "study --categories cut-in --models CCHDM --out OUT", "figures/f1-cut-in.svg"),
+    ("f1-cut-in.svg", "study --out OUT", "figures/f1-cut-in.svg"),
     ("case.svg", CASE, "case.svg"),
     (
         "cut_in_to_60_cchdm.svg",
         "map cut-in --preset r157 --models CCHDM,FSM --robust --out OUT",
-        "cut_in_to_60_cchdm.svg",
+        "figures/cut_in_to_60_cchdm.svg",
     ),
 ];
 const CASE: &str = "simulate --category cut-in --models all --ego-speed 30m/s --speed 20m/s --thw 1.2 --lateral-speed 1.0 \

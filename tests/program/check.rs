@@ -21,7 +21,19 @@ fn arguments(case: &str) -> String {
 }
 
 fn run(case: &str) -> (i32, String, String) {
-    lanesweep(Path::new("."), &words(&arguments(case)))
+    lanesweep(Path::new("."), &words(&format!("{} --full", arguments(case))))
+}
+
+#[test]
+fn without_full_a_sheet_is_one_screen_that_names_what_it_leaves_out() {
+    let (_, full, _) = run("cut-in 60 40 15 1.0");
+    let (code, brief, _) = lanesweep(Path::new("."), &words(&arguments("cut-in 60 40 15 1.0")));
+    assert_eq!(code, 0);
+    assert!(brief.lines().count() <= 30 && full.lines().count() > 60, "{brief}");
+    for said in ["preventable under un-r157", "UN R157, 5.2.5.2", "FSM", "Initial gap (m)", "--full", "--sheet"] {
+        assert!(brief.contains(said), "{said}: {brief}");
+    }
+    assert!(full.contains("Clauses under un-r157") && !brief.contains("Clauses under"));
 }
 
 fn json(case: &str) -> Value {

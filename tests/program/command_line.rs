@@ -39,7 +39,7 @@ fn one_bad_recording_among_many_is_reported_the_others_are_used_and_the_exit_sta
     std::fs::write(dir.path().join("data/03_tracks.csv"), "frame,id\n").unwrap();
     let (code, said) = said(dir.path(), "study data --out out");
     assert!(code == 4 && said.contains("03_tracksMeta.csv"), "{code} {said}");
-    assert!(dir.path().join("out/f1.csv").exists());
+    assert!(dir.path().join("out/results.csv").exists());
     assert!(read(dir.path(), "out/run.json").contains("03_tracksMeta.csv"), "what was left out stands in run.json");
 }
 

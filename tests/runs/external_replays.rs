@@ -14,18 +14,18 @@ fn s_prime_of_other_programs_and_of_bases_of_other_folds_are_scored() {
     // S itself as S' of another program, in a file whose name is no key.
     std::fs::copy(of("scenarios.jsonl"), of("my same.v2.jsonl")).unwrap();
     let study = "-q study --scenarios scenarios.jsonl --external";
-    let external = study.replace("--external", "--cross-validate --categories cut-in --out study --external");
+    let external = study.replace("--external", "--categories cut-in --out study --external");
     done(dir.path(), &[&words(&external)[..], &["my same.v2.jsonl"]].concat());
-    let variants = std::fs::read_to_string(of("study/variants.csv")).unwrap();
+    let variants = std::fs::read_to_string(of("study/tables/variants.csv")).unwrap();
     let row = |name: &str| variants.lines().find(|line| line.starts_with(&format!("cut_in,{name},"))).unwrap();
     assert_eq!(row("my-same-v2"), "cut_in,my-same-v2,0,1,1,1,synthetic", "{variants}");
     row("5-cv");
-    assert_eq!(std::fs::read_to_string(of("study/folds.csv")).unwrap().lines().next(), Some("id,fold"));
+    assert_eq!(std::fs::read_to_string(of("study/tables/folds.csv")).unwrap().lines().next(), Some("id,fold"));
     #[cfg(feature = "parquet")]
     {
         ran(dir.path(), "-q mine recordings --out as-parquet.parquet");
         ran(dir.path(), &format!("{study} as-parquet.parquet --out parquet"));
-        let variants = std::fs::read_to_string(of("parquet/variants.csv")).unwrap();
+        let variants = std::fs::read_to_string(of("parquet/tables/variants.csv")).unwrap();
         assert!(variants.contains("lvd,as-parquet,0,1,1,1"), "{variants}");
     }
     // Rows moved by one: S' of one scenario has the id of the next.
@@ -68,7 +68,7 @@ fn s_prime_of_other_programs_and_of_bases_of_other_folds_are_scored() {
         said(dir.path(), &format!("{} changed.jsonl --categories cut-out --out ids", &study[3..])).1
     };
     let feet = changed(&|row| row["D"] = (row["D"].as_f64().unwrap() / 0.3048).into());
-    assert!(feet.contains("`D` is 3.28 times that of the scenarios on average"), "{feet}");
+    assert!(feet.contains("`D` is 3.281 times that of the scenarios on average"), "{feet}");
     let exchanged = changed(&|row| {
         let target = row["target"]["v"].take();
         row["target"]["v"] = row["lead"]["v"].take();
@@ -76,7 +76,24 @@ fn s_prime_of_other_programs_and_of_bases_of_other_folds_are_scored() {
     });
     assert!(exchanged.contains("begin as if `target` and `lead` were exchanged"), "{exchanged}");
     let same = changed(&|_| ());
-    assert!(!same.contains("changed.jsonl: "), "{same}");
+    assert!(same.contains("has the series of its scenario: it is S itself"), "{same}");
+    // What is S' but in lane widths, or without its first half a second.
+    let scaled = changed(&|row| {
+        let y: Vec<f64> = row["target"]["y"].as_array().unwrap().iter().map(|y| y.as_f64().unwrap() / 3.5).collect();
+        row["target"]["y"] = y.into();
+    });
+    assert!(scaled.contains("S' (cut-out) move 0.2857 times as far to the side"), "{scaled}");
+    let late = changed(&|row| {
+        for of in ["target", "lead"] {
+            for series in ["v", "y"] {
+                if let Some(values) = row[of][series].as_array_mut().filter(|values| values.len() > 20) {
+                    values.drain(..12);
+                }
+            }
+        }
+        ["frame0", "frame1"].iter().for_each(|frame| drop(row.as_object_mut().unwrap().remove(*frame)));
+    });
+    assert!(late.contains("are 0.48 s shorter than their scenarios"), "{late}");
     let slower = cut_ins.iter().cloned().map(|mut row| {
         row["ego"]["v0"] = (0.8 * row["ego"]["v0"].as_f64().unwrap()).into();
         format!("{row}\n")

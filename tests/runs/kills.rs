@@ -60,7 +60,8 @@ const SEARCH: &str = "search.json";
 
 /// Not a result: the plan, and what is there only while a run is at work.
 fn is_beside(name: &str) -> bool {
-    let is_of_work = name.starts_with('.') || name.ends_with(".lock") || name.ends_with(".journal");
+    let is_hidden = name.rsplit('/').next().is_some_and(|name| name.starts_with('.'));
+    let is_of_work = is_hidden || name.ends_with(".lock") || name.ends_with(".journal");
     is_of_work || name == "plan.json" || name == LIST
 }
 
@@ -88,7 +89,9 @@ fn put(dir: &Path, from: Option<&str>) {
     let _ = std::fs::remove_dir_all(dir.join("out"));
     std::fs::create_dir(dir.join("out")).unwrap();
     for name in from.map_or(Vec::new(), |from| names(&dir.join(from))) {
-        std::fs::copy(dir.join(from.unwrap()).join(&name), dir.join("out").join(&name)).unwrap();
+        let to = dir.join("out").join(&name);
+        std::fs::create_dir_all(to.parent().unwrap()).unwrap();
+        std::fs::copy(dir.join(from.unwrap()).join(&name), to).unwrap();
     }
 }
 

@@ -293,8 +293,14 @@ fn the_same_files_come_from_any_number_of_threads() {
         (stdout, program::without_host(files(&dir.join(threads))))
     });
     let names: Vec<String> = files(&dir.join("1")).into_keys().collect();
-    let expected =
-        ["cells.csv", "cut_in_cchdm.svg", "cut_in_fsm.svg", "lanesweep-files.json", "map.json", "report.html"];
+    let expected = [
+        "cells.csv",
+        "figures/cut_in_cchdm.svg",
+        "figures/cut_in_fsm.svg",
+        "lanesweep-files.json",
+        "map.json",
+        "report.html",
+    ];
     assert_eq!(names, expected);
     for (stdout, files) in &outs {
         assert_eq!(*stdout, outs[0].0);
@@ -307,7 +313,7 @@ fn the_same_files_come_from_any_number_of_threads() {
     assert_eq!(record["simulations"], 5 * 60 * 17 * 2);
     assert_eq!(record["grids"][0]["plans"][0]["plan_sha256"].as_str().unwrap().len(), 64);
     for words in ["Initial gap (m)", ">ego 120 km/h<", ">other 70 km/h<", "class=\"boundary\""] {
-        assert!(read("cut_in_fsm.svg").contains(words), "{words}");
+        assert!(read("figures/cut_in_fsm.svg").contains(words), "{words}");
     }
 }
 
@@ -459,7 +465,7 @@ fn tables_files_and_legends_of_a_map_count_the_same_cells() {
             }
             for share in grid["shares"].as_array().unwrap() {
                 let model = share["model"].as_str().unwrap();
-                let svg = read(&format!("{name}_{}.svg", model.to_lowercase()));
+                let svg = read(&format!("figures/{name}_{}.svg", model.to_lowercase()));
                 let line = stdout.lines().map(|line| line.split('|').map(str::trim).collect::<Vec<_>>());
                 let words = line.clone().find(|words| words.contains(&"share %")).unwrap();
                 let line = line.clone().find(|words| words.contains(&name) && words.contains(&model)).unwrap();

@@ -29,7 +29,7 @@ fn an_output_never_replaces_an_input_or_another_result() {
     }
     assert!(read(&dir.join("in/01_tracks.csv")) == tracks);
     scenarios(dir);
-    for rows in ["s.jsonl", "out/f1.csv"] {
+    for rows in ["s.jsonl", "out/results.csv"] {
         refused(dir, &format!("study --scenarios s.jsonl --rows {rows} --out out"), 2, "would be overwritten");
     }
     std::fs::write(dir.join("cases.csv"), "category,ego_speed_kmh,thw_s,acceleration_mps2\nlvd,60,1,-5\n").unwrap();
@@ -42,13 +42,13 @@ fn what_the_run_before_left_goes_and_what_no_record_lists_stays() {
     let (dir, out) = (dir.path(), dir.path().join("out"));
     scenarios(dir);
     ran(dir, "-q study --scenarios s.jsonl --config study.compare_reference=true --out out");
-    assert!(out.join("radar-cut-in.svg").exists() && out.join("reference.csv").exists());
+    assert!(out.join("figures/radar-cut-in.svg").exists() && out.join("tables/reference.csv").exists());
     // The second has a name that a study could give.
-    let mine = ["notes.txt", "radar-of-mine.svg"];
+    let mine = ["notes.txt", "figures/radar-of-mine.svg"];
     mine.iter().for_each(|name| std::fs::write(out.join(name), "mine").unwrap());
     ran(dir, "-q study --scenarios s.jsonl --categories lvd --out out");
-    assert!(!out.join("radar-cut-in.svg").exists() && !out.join("reference.csv").exists());
-    assert!(out.join("radar-lvd.svg").exists());
+    assert!(!out.join("figures/radar-cut-in.svg").exists() && !out.join("tables/reference.csv").exists());
+    assert!(out.join("figures/radar-lvd.svg").exists());
     mine.iter().for_each(|name| assert_eq!(read(&out.join(name)), "mine"));
 }
 
@@ -91,7 +91,7 @@ fn a_folder_from_somebody_else_makes_no_run_write_elsewhere() {
     let study = "-q study --scenarios s.jsonl --categories lvd --out out";
     for (run, name, code) in [
         (study, "run.lock", 3),
-        (study, "f1.csv", 2),
+        (study, "results.csv", 2),
         (study, "run-plan.json", 2),
         (&format!("{study} --shard 0/1"), "part-00000-of-00001.lock", 3),
         (&format!("{study} --shard 0/1"), "part-00000-of-00001.journal", 3),

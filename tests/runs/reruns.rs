@@ -74,7 +74,8 @@ fn a_thousand_random_lanes_of_the_default_study_are_the_studys_lanes() {
     let dir = dir.path();
     ran(dir, "-q study --synth-recordings 24 --backend cpu --out result");
     // The study itself, as it sweeps: in batches, on the widest instructions.
-    let study = plan_study(scenarios(), &Profile::load("paper").unwrap(), &StudyOptions::default()).unwrap();
+    let options = StudyOptions { folds: Some(5), ..StudyOptions::default() };
+    let study = plan_study(scenarios(), &Profile::load("paper").unwrap(), &options).unwrap();
     let mut session = CpuBackend::lane_arithmetic().prepare(&study).unwrap();
     let outcomes: Vec<Outcome<f64>> = session.run(0..study.unit_count(), Wanted::Outcomes).unwrap().outcomes;
     assert_eq!(outcomes.len() as u64, study.lane_count());

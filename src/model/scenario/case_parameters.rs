@@ -249,6 +249,9 @@ impl PlainCase {
         if ego != others {
             doubts.check_shape(ego.0, ego.1, || place("ego_length"));
         }
+        if self.category == Category::CutIn {
+            doubts.note_cutter(self.speed_mps > self.ego_speed_mps);
+        }
         if self.category == Category::Lvd {
             doubts.note_leader(self.acceleration_mps2);
         } else if self.lateral_speed_mps > self.speed_mps {

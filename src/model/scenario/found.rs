@@ -158,13 +158,17 @@ fn contradictions(scenarios: &[Scenario]) -> Vec<String> {
     type Rule<'a> = (&'a str, &'a dyn Fn(&Scenario) -> bool);
     let ends = |s: &Scenario| outside_and_inside(s).filter(|_| s.kept);
     let is_off = |s: &Scenario| ends(s).is_some_and(|(_, inside)| inside.abs() > IN_LANE_SHARE * s.lane_width);
-    // Two lane changes may end beyond their lanes; most of a category do not.
-    let are_off = Category::ALL.map(|category| {
-        let of = || scenarios.iter().filter(|s| s.kept && s.category == category);
-        (of().count() / 2).max(2) < of().filter(|s| is_off(s)).count()
-    });
+    let is_inside = |s: &Scenario| ends(s).is_some_and(|(outside, _)| outside.abs() < IN_LANE_SHARE * s.lane_width);
+    // Two lane changes may end beyond their lanes, or begin late; most of a category do not.
+    let most = |is: &dyn Fn(&Scenario) -> bool| {
+        Category::ALL.map(|category| {
+            let of = || scenarios.iter().filter(|s| s.kept && s.category == category);
+            (of().count() / 2).max(2) < of().filter(|s| is(s)).count()
+        })
+    };
+    let (are_off, are_inside) = (most(&is_off), most(&is_inside));
     let others = |s: &Scenario, is: fn(&Other, &Scenario) -> bool| is(&s.target, s) || s.lead.iter().any(|o| is(o, s));
-    let rules: [Rule; 8] = [
+    let rules: [Rule; 9] = [
         (
             "lane change(s) move away from the ego's lane where they should enter it, or the reverse: y is the distance from its middle",
             &|s| ends(s).is_some_and(|(outside, inside)| inside.abs() > outside.abs() + LATERAL_NOISE_M),
@@ -176,6 +180,9 @@ fn contradictions(scenarios: &[Scenario]) -> Vec<String> {
         ("kept scenario(s) are never in the ego's lane: y is the distance from its middle", &|s| {
             s.kept && others(s, |o, s| o.y.iter().all(|y| y.abs() > OTHER_LANE_SHARE * s.lane_width))
                 || are_off[s.category as usize] && is_off(s)
+        }),
+        ("lane change(s) are in the ego's lane throughout: y is in m, from its middle", &|s| {
+            are_inside[s.category as usize] && is_inside(s)
         }),
         (
             "scenario(s) have a vehicle that moves farther to the side than along the road: a speed is missing or another vehicle's",

@@ -137,6 +137,9 @@ pub struct Scenario {
     /// In the plan of a study: S' that are given as series, in the order of the plan's variants.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub replays: Vec<ReducedScenario>,
+    /// In the plan of a study: the fold of its cross-validation.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fold: Option<usize>,
 }
 
 fn yes() -> bool {

@@ -44,8 +44,6 @@ pub(crate) struct Axis {
     high: f64,
     from_px: f64,
     to_px: f64,
-    /// Whether its values are whole numbers.
-    pub is_count: bool,
 }
 
 /// A tick of the axis, with its number if there is room for it.
@@ -88,12 +86,12 @@ impl Axis {
             }
             AxisScale::SquareRoot => (0.0, 1.0),
         };
-        Some(Self { scale, low, high, from_px, to_px, is_count: false })
+        Some(Self { scale, low, high, from_px, to_px })
     }
 
     /// The linear axis that ends exactly at `low` and `high` (finite, `low < high`).
     pub(super) fn exactly((low, high): (f64, f64), (from_px, to_px): (f64, f64)) -> Self {
-        Self { scale: AxisScale::Linear, low, high, from_px, to_px, is_count: false }
+        Self { scale: AxisScale::Linear, low, high, from_px, to_px }
     }
 
     /// Whether `value` is between the ends.
@@ -146,7 +144,7 @@ impl Axis {
 
     fn linear_ticks(&self, max_ticks: usize) -> Vec<Tick> {
         let step = plain_step((self.high - self.low) / max_ticks.max(1) as f64);
-        let step = if self.is_count { step.max(1.0) } else { step };
+
         let (first, last) = ((self.low / step - 1e-9).ceil(), (self.high / step + 1e-9).floor());
         // Neighbouring numbers must differ, at any distance from zero.
         let largest = self.low.abs().max(self.high.abs()) / step;
@@ -211,13 +209,6 @@ pub(crate) fn logarithmic_reach(intervals: &[(f64, f64, f64)]) -> Vec<f64> {
     let Some(smallest) = middles.iter().copied().filter(shown).reduce(f64::min) else { return Vec::new() };
     let lows = intervals.iter().map(|(_, l, _)| *l).filter(shown).map(|l| l.max(smallest / 10.0));
     middles.iter().copied().chain(intervals.iter().map(|(_, _, u)| *u)).chain(lows).filter(shown).collect()
-}
-
-/// The name of a parameter in words, without its unit: `lateral speed` for `lateral_speed_mps`.
-pub(crate) fn quantity(name: &str) -> String {
-    let units = ["_mps2", "_mps", "_m", "_s"];
-    let bare = units.iter().find_map(|unit| name.strip_suffix(unit)).unwrap_or(name);
-    bare.replace('_', " ")
 }
 
 /// A number with three digits in short form: `0.012`, `250`, `1.5e-6`; NaN and infinity in words.

@@ -1,7 +1,7 @@
 //! What a plot draws: cells (rectangles whose flat colour shows their content), over them rules, over both series
-//! (line, points, band, intervals, bars).
+//! (line, points, band, intervals).
 
-use super::axis::{Axes, number};
+use super::axis::Axes;
 use super::look::Look;
 use super::svg::{Anchor, Canvas, GREY, GRID, Paint, Position, Type, WHITE, set};
 
@@ -35,8 +35,6 @@ pub enum Mark {
     /// The interval of each value as a line with a bar at both ends; for a zero on a logarithmic axis an upper limit
     /// with an arrow.
     Intervals,
-    /// A bar from zero per value, with this width in the unit of x.
-    Bars(f64),
 }
 
 /// One value of a series.
@@ -50,13 +48,11 @@ pub struct Value {
     pub interval: Option<(f64, f64)>,
     /// Ends of a wider interval, drawn paler and thinner.
     pub outer: Option<(f64, f64)>,
-    /// Ends of the interval of its other coordinate, drawn thinner.
-    pub across: Option<(f64, f64)>,
     /// Based on few failing scenarios: its marker is hollow.
     pub is_few: bool,
     /// Label beside it.
     pub label: String,
-    /// Tooltip of its marker in a browser; empty: name and numbers.
+    /// Tooltip of its marker in a browser; empty: row, name and numbers.
     pub tip: String,
 }
 
@@ -174,7 +170,7 @@ impl Series {
 
     /// The ends of a value's interval along x, or along y.
     pub(super) fn ends_of(&self, value: &Value, along_x: bool) -> Option<(f64, f64)> {
-        if self.is_sideways == along_x { value.interval } else { value.across }
+        value.interval.filter(|_| self.is_sideways == along_x)
     }
 
     /// The ends of a value's interval on the page.
@@ -203,15 +199,7 @@ impl Series {
         }
     }
 
-    pub(super) fn bars_and_line(&self, canvas: &mut Canvas, axes: &Axes, look: &Look) {
-        for mark in &self.marks {
-            let Mark::Bars(width) = mark else { continue };
-            for value in self.values.iter().filter(|value| axes.shows(value.place()) && value.y != 0.0) {
-                let (from, to) = ((value.x - width / 2.0, 0.0), (value.x + width / 2.0, value.y));
-                let paint = Paint { stroke: Some((WHITE, 0.8)), ..Paint::fill(look.colour) };
-                canvas.rect(axes.at(from), axes.at(to), paint);
-            }
-        }
+    pub(super) fn line(&self, canvas: &mut Canvas, axes: &Axes, look: &Look) {
         let runs = self.runs(axes);
         if !self.has(Mark::Line) || runs.is_empty() {
             return;
@@ -235,7 +223,7 @@ impl Series {
         canvas: &mut Canvas,
         axes: &Axes,
         look: &Look,
-        quantities: (&str, &str),
+        tip: &dyn Fn(&Value) -> String,
         taken: &mut Vec<(f64, f64, f64)>,
     ) {
         let is_shown =
@@ -259,18 +247,14 @@ impl Series {
                 continue;
             }
             let place = axes.at((value.x, value.y));
-            canvas.group(attributes, &self.tip(value, quantities), |canvas| {
+            let tip = if value.tip.is_empty() && self.attributes.is_empty() { tip(value) } else { value.tip.clone() };
+            canvas.group(attributes, &tip, |canvas| {
                 let thin = Look { line_px: 0.5 * look.line_px, ..*look };
                 for (interval, look) in [(value.outer, &thin), (value.interval, look)] {
                     if let Some(ends) = self.ends(value, interval, axes).filter(|_| self.has(Mark::Intervals)) {
                         let holds = interval.map_or((false, false), |(low, high)| (axis.holds(low), axis.holds(high)));
-                        let is_barred = value.across.is_none();
-                        self.interval(canvas, ends, (is_barred && holds.0, is_barred && holds.1), look);
+                        self.interval(canvas, ends, holds, look);
                     }
-                }
-                let across = Series { is_sideways: !self.is_sideways, ..Series::default() };
-                if let Some((from, to)) = across.ends(value, value.across, axes) {
-                    canvas.path(&[vec![from, to]], false, Paint::line(look.colour, look.line_px));
                 }
                 Look { is_hollow: value.is_few, ..*look }.marker(canvas, place);
             });
@@ -279,15 +263,6 @@ impl Series {
                 label(canvas, (place, look.colour, self.has(Mark::Line)), &value.label, axes, taken);
             }
         }
-    }
-
-    fn tip(&self, value: &Value, (x, y): (&str, &str)) -> String {
-        if !value.tip.is_empty() || !self.attributes.is_empty() {
-            return value.tip.clone();
-        }
-        let numbers = [format!("{x} {}", number(value.x)), format!("{y} {}", number(value.y))];
-        let words = [&self.name, &value.label, &numbers[0], &numbers[1]];
-        words.into_iter().filter(|word| !word.is_empty()).cloned().collect::<Vec<_>>().join("; ")
     }
 
     /// Draws an interval, with a bar at its lower end, at its upper end.
@@ -320,9 +295,9 @@ impl Series {
 
     /// Draws a sample of the series for the legend.
     pub(super) fn sample(&self, canvas: &mut Canvas, (x, y): Position, width_px: f64, look: &Look) {
-        if self.marks.iter().any(|mark| matches!(mark, Mark::Band | Mark::Bars(_))) {
-            let opacity = if self.has(Mark::Band) { Some(0.16) } else { None };
-            canvas.rect((x, y - 7.0), (x + width_px, y + 7.0), Paint { opacity, ..Paint::fill(look.colour) });
+        if self.has(Mark::Band) {
+            let paint = Paint { opacity: Some(0.16), ..Paint::fill(look.colour) };
+            canvas.rect((x, y - 7.0), (x + width_px, y + 7.0), paint);
         }
         if self.has(Mark::Line) || self.has(Mark::Intervals) {
             let dash = if self.has(Mark::Line) { look.dash } else { "" };

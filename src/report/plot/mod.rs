@@ -16,7 +16,7 @@ pub(super) use axis::AxisScale;
 pub(super) use layer::{Cells, FilledCell, Mark, Rule, Series, Value};
 pub(super) use look::{Look, Symbol};
 
-pub(super) use axis::{logarithmic_reach, number, plain_end, quantity};
+pub(super) use axis::{logarithmic_reach, number, plain_end};
 use layer::{HOLLOW, fill_sample};
 pub(super) use layer::{TICK, is_few};
 pub(super) use svg::{Anchor, Canvas, GREY, INK, Type, set};
@@ -112,8 +112,6 @@ pub struct PlotAxis {
     pub ends: Ends,
     /// Names instead of numbers.
     pub names: Vec<Name>,
-    /// Whether the values are whole numbers.
-    pub is_count: bool,
 }
 
 /// Ends of an axis.
@@ -162,14 +160,17 @@ impl PlotAxis {
     }
 
     fn place(&self, values: impl Iterator<Item = f64>, ends_px: (f64, f64)) -> Option<axis::Axis> {
-        let mut placed = match &self.ends {
+        match &self.ends {
             Ends::Exactly(low, high) => Some(axis::Axis::exactly((*low, *high), ends_px)),
             Ends::Around(values) => axis::Axis::around(self.scale, values, ends_px),
             Ends::Layers => axis::Axis::around(self.scale, &values.collect::<Vec<_>>(), ends_px),
-        };
-        placed.iter_mut().for_each(|axis| axis.is_count = self.is_count);
-        placed
+        }
     }
+}
+
+/// Height of a name beside a plot, px.
+pub(super) fn name_height_px(words: &str) -> f64 {
+    TEXT.height_px(words, NAME_PX)
 }
 
 impl Figure {
@@ -179,8 +180,40 @@ impl Figure {
         self.svg_with(|_, y| y)
     }
 
+    /// The figure for a paper, as wide as a column (88 mm) or two (180 mm), and its texts, which are not in it.
+    pub(super) fn plain(&self) -> (String, String) {
+        let bare = Figure {
+            title: String::new(),
+            subtitle: None,
+            caption: String::new(),
+            notes: ("", Vec::new()),
+            ..self.clone()
+        };
+        let width_mm = if self.is_wide { 180.0 } else { 88.0 };
+        let mut texts = vec![self.title.clone()];
+        texts.extend(self.subtitle.clone());
+        texts.push(self.caption.clone());
+        if self.has_few() {
+            texts.push(HOLLOW.to_owned());
+        }
+        if !self.notes.1.is_empty() {
+            texts.push(self.notes.0.to_owned());
+            texts.extend(self.notes.1.iter().cloned());
+        }
+        (bare.drawn(|_, y| y).in_mm(width_mm).document(&self.title, &self.caption), texts.join("\n") + "\n")
+    }
+
+    fn has_few(&self) -> bool {
+        self.series().flat_map(|series| &series.values).any(|value| value.is_few)
+    }
+
     /// The same with what `between` draws below the heading, from a y to the y that it returns.
     pub(super) fn svg_with(&self, between: impl FnOnce(&mut Canvas, f64) -> f64) -> String {
+        let description = [self.subtitle.as_deref().unwrap_or_default(), &self.caption].join(" ");
+        self.drawn(between).document(&self.title, description.trim())
+    }
+
+    fn drawn(&self, between: impl FnOnce(&mut Canvas, f64) -> f64) -> Canvas {
         let width_px = self.width_px();
         let mut canvas = Canvas::new(width_px + 2.0 * MARGIN_PX);
         let mut y = canvas.paragraph((MARGIN_PX, 14.0), &self.title, TITLE, width_px);
@@ -190,8 +223,11 @@ impl Figure {
         y = between(&mut canvas, y + 8.0);
         y = self.rows(&mut canvas, y);
         y = self.legend(&mut canvas, y + 2.0);
-        let is_few = self.series().flat_map(|series| &series.values).any(|v| v.is_few);
-        let caption = if is_few { [&self.caption, HOLLOW].join(" ") } else { self.caption.clone() };
+        let caption = if self.has_few() && !self.caption.is_empty() {
+            [&self.caption, HOLLOW].join(" ")
+        } else {
+            self.caption.clone()
+        };
         y = canvas.paragraph((MARGIN_PX, y + 3.0), &caption, TEXT, width_px);
         if !self.notes.1.is_empty() {
             y = canvas.paragraph((MARGIN_PX, y + 5.0), self.notes.0, HEADING, width_px);
@@ -199,7 +235,8 @@ impl Figure {
         for line in &self.notes.1 {
             y = canvas.paragraph((MARGIN_PX, y + 2.0), line, TEXT, width_px);
         }
-        canvas.document(y)
+        canvas.end_at(y);
+        canvas
     }
 
     /// The numbers of the series: one row per value.
@@ -208,7 +245,7 @@ impl Figure {
         let rows = series.flat_map(|(plot, series)| series.values.iter().map(move |value| (plot, series, value)));
         Table::of(rows)
             .column("panel", |(plot, ..)| plot.heading.as_str())
-            .column("row", |(plot, _, value)| plot.row_of(value))
+            .column("row", |(plot, _, value)| plot.name_of(value).map_or("", |name| name.words.as_str()))
             .column("series", |(_, series, _)| series.name.as_str())
             .column("label", |(.., value)| value.label.as_str())
             .column("x_quantity", |(plot, ..)| plot.x.label.as_str())
@@ -389,13 +426,12 @@ enum Entry<'a> {
 }
 
 impl Plot {
-    /// The name beside a value, or of its spoke; empty on an axis with numbers.
-    fn row_of(&self, value: &Value) -> &str {
-        let found = match self.is_polar {
+    /// The name beside a value, or of its spoke; `None` on an axis with numbers.
+    fn name_of(&self, value: &Value) -> Option<&Name> {
+        match self.is_polar {
             true => self.x.names.iter().rfind(|name| name.at <= value.x),
             false => self.y.names.iter().rfind(|name| name.at >= value.y),
-        };
-        found.map_or("", |name| name.words.as_str())
+        }
     }
 
     fn is_blank(&self) -> bool {
@@ -423,9 +459,6 @@ impl Plot {
 
     /// The axes within these ends; `None` if there is nothing to show.
     fn axes(&self, across: (f64, f64), down: (f64, f64), centre: Option<Position>) -> Option<Axes> {
-        let width =
-            |series: &Series| series.marks.iter().find_map(|m| if let Mark::Bars(w) = m { Some(*w) } else { None });
-        let half = self.series.iter().filter_map(width).fold(0.0, f64::max) / 2.0;
         let shown = || {
             let is_shown = |v: &&Value| self.x.scale.shows(v.x) && self.y.scale.shows(v.y);
             self.series.iter().flat_map(|series| &series.values).filter(is_shown)
@@ -433,9 +466,8 @@ impl Plot {
         if !self.is_polar && !self.series.is_empty() && !self.series.iter().any(|series| self.shows(series)) {
             return None;
         }
-        let x = self.x.place(shown().flat_map(|v| [v.x - half, v.x + half]), across)?;
-        let zero = (half > 0.0).then_some(0.0);
-        let y = self.y.place(shown().map(|v| v.y).chain(zero), (down.1, down.0))?;
+        let x = self.x.place(shown().map(|v| v.x), across)?;
+        let y = self.y.place(shown().map(|v| v.y), (down.1, down.0))?;
         Some(Axes { x, y, centre })
     }
 
@@ -473,15 +505,38 @@ impl Plot {
         self.rules.iter().for_each(|rule| rule.draw(canvas, axes));
         // All bands, then all lines, then all markers: a band never hides a value.
         self.series.iter().for_each(|series| series.bands(canvas, axes, &look(series)));
-        self.series.iter().for_each(|series| series.bars_and_line(canvas, axes, &look(series)));
+        self.series.iter().for_each(|series| series.line(canvas, axes, &look(series)));
     }
 
     fn markers(&self, canvas: &mut Canvas, axes: &Axes, look: &dyn Fn(&Series) -> Look) {
         let mut taken = Vec::new();
         self.rules.iter().for_each(|rule| rule.name_at_end(canvas, axes, &mut taken));
         for series in &self.series {
-            series.markers(canvas, axes, &look(series), (&self.x.label, &self.y.label), &mut taken);
+            series.markers(canvas, axes, &look(series), &|value| self.tip(series, value), &mut taken);
         }
+    }
+
+    /// `FSM, collision; 2: constant acceleration; F1 0.86 [0.84 0.88]; n = 285`.
+    fn tip(&self, series: &Series, value: &Value) -> String {
+        let along = |axis: &PlotAxis, at: f64, ends: Option<(f64, f64)>| {
+            let interval = ends.map(|(low, high)| format!(" [{} {}]", number(low), number(high))).unwrap_or_default();
+            let is_named = !axis.names.is_empty() || axis.label.is_empty();
+            if is_named { String::new() } else { format!("{} {}{interval}", axis.label, number(at)) }
+        };
+        let (row, note) = self.name_of(value).map_or(("", ""), |name| (&name.words, &name.note));
+        // In a polar plot the radius has names, and a quantity.
+        let y = PlotAxis { names: Vec::new(), ..self.y.clone() };
+        let y = if self.is_polar { &y } else { &self.y };
+        let words = [
+            self.heading.as_str(),
+            row,
+            &series.name,
+            &value.label,
+            &along(&self.x, value.x, series.ends_of(value, true)),
+            &along(y, value.y, series.ends_of(value, false)),
+            note,
+        ];
+        words.into_iter().filter(|word| !word.is_empty()).collect::<Vec<_>>().join("; ")
     }
 
     /// Draws rings, spokes with their names, and series around the middle of the page; returns the y below.

@@ -114,22 +114,43 @@ pub(crate) enum Anchor {
 #[derive(Debug)]
 pub(crate) struct Canvas {
     width_px: f64,
+    height_px: f64,
+    /// Width on paper; `None`: 1 px is 1 px.
+    width_mm: Option<f64>,
     body: String,
     depth: usize,
 }
 
 impl Canvas {
     pub(super) fn new(width_px: f64) -> Self {
-        Canvas { width_px, body: String::new(), depth: 1 }
+        Canvas { width_px, height_px: 0.0, width_mm: None, body: String::new(), depth: 1 }
     }
 
-    /// The finished document, ending a little below `bottom`.
-    pub(super) fn document(self, bottom: f64) -> String {
+    /// Ends the page a little below `bottom`.
+    pub(super) fn end_at(&mut self, bottom: f64) {
+        self.height_px = (bottom + 20.0).ceil();
+    }
+
+    /// The same with a width on paper.
+    pub(super) fn in_mm(self, width_mm: f64) -> Self {
+        Canvas { width_mm: Some(width_mm), ..self }
+    }
+
+    /// The finished document, with what a screen reader says of it.
+    pub(super) fn document(self, title: &str, description: &str) -> String {
+        let (width, height) = (Number(self.width_px), Number(self.height_px));
+        let size = match self.width_mm {
+            None => format!("width=\"{width}\" height=\"{height}\""),
+            Some(mm) => {
+                let height_mm = Number(mm * self.height_px / self.width_px);
+                format!("width=\"{}mm\" height=\"{height_mm}mm\" viewBox=\"0 0 {width} {height}\"", Number(mm))
+            }
+        };
         format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}\" height=\"{}\" font-family=\"{FONTS}\" \
-             fill=\"{INK}\">\n  <rect width=\"100%\" height=\"100%\" fill=\"white\" />\n{}</svg>\n",
-            Number(self.width_px),
-            Number((bottom + 20.0).ceil()),
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" {size} font-family=\"{FONTS}\" fill=\"{INK}\">\n  \
+             <title>{}</title>\n  <desc>{}</desc>\n  <rect width=\"100%\" height=\"100%\" fill=\"{WHITE}\" />\n{}</svg>\n",
+            escaped(title),
+            escaped(description),
             self.body
         )
     }

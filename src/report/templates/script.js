@@ -1,8 +1,8 @@
 "use strict";
-// A click on a column's head sorts the rows by it, a second click the other way round.
+// A click, Enter or a blank on a column's head sorts the rows by it, a second one the other way round.
 for (const table of document.querySelectorAll("table")) {
   const heads = [...table.tHead.rows[0].cells];
-  heads.forEach((head, at) => head.addEventListener("click", () => {
+  const sort = (head, at) => {
     const down = head.ariaSort === "ascending" ? -1 : 1;
     heads.forEach((other) => { other.ariaSort = null; });
     head.ariaSort = down > 0 ? "ascending" : "descending";
@@ -18,7 +18,14 @@ for (const table of document.querySelectorAll("table")) {
       return Number.isNaN(x) ? 1 : Number.isNaN(y) ? -1 : x === y ? 0 : down * (x > y ? 1 : -1);
     };
     table.tBodies[0].append(...[...table.tBodies[0].rows].sort(order));
-  }));
+  };
+  heads.forEach((head, at) => {
+    head.tabIndex = 0;
+    head.addEventListener("click", () => sort(head, at));
+    head.addEventListener("keydown", (event) => {
+      if (event.key === "Enter" || event.key === " ") { event.preventDefault(); sort(head, at); }
+    });
+  });
 }
 // The value of a mark beside the pointer, at once.
 const tip = document.getElementById("tip");

@@ -21,7 +21,13 @@ pub struct Best {
     pub failing_scenarios: u64,
     /// The result; `None` if S fails in fewer scenarios than [`super::ScoreOptions::min_failures`].
     pub score: Option<BestScore>,
+    /// So many times as many scenarios would tell it from all rivals, or give a result, if nothing else changes. 1: these
+    /// do. `None`: more than [`MAX_TIMES`].
+    pub data_for_decision: Option<f64>,
 }
+
+/// Nobody collects so many times as much data.
+const MAX_TIMES: f64 = 20.0;
 
 /// Scores of a best parameterization.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,9 +42,6 @@ pub struct BestScore {
     pub hidden: u64,
     /// Parameterizations whose F1 is not significantly different.
     pub rivals: Vec<String>,
-    /// Required multiple of the number of scenarios to distinguish it from all rivals, if the scores stay the same;
-    /// infinite if a rival has the same F1.
-    pub more_data: f64,
 }
 
 /// The best parameterization per category and model of a table, for a criterion. `counts` are the counts that the table
@@ -51,35 +54,33 @@ pub fn best_parameterizations(
 ) -> Vec<Best> {
     let of = |scores: &CategoryScores, model: ModelId| {
         let s = &scores.cells[scores.index(0, model, criterion)?];
-        let is_enough = s.failing_scenarios >= u64::from(table.options.min_failures.max(1));
+        let min_failures = u64::from(table.options.min_failures.max(1));
         let units = units_of(plan, counts, scores.category);
         let score = || best_score(scores, units, (model, criterion), table.options.confidence);
+        let found = (s.failing_scenarios >= min_failures).then(score).flatten();
+        let too_few = || (None, min_failures as f64 / s.failing_scenarios as f64);
+        let (score, times) = found.map_or_else(too_few, |(score, times)| (Some(score), times));
         Some(Best {
             category: scores.category,
             model,
             failures: s.counts.tp,
             failing_scenarios: s.failing_scenarios,
-            score: is_enough.then(score).flatten(),
+            score,
+            data_for_decision: (times <= MAX_TIMES).then_some(times),
         })
     };
     let pairs = table.categories.iter().flat_map(|scores| scores.models.iter().map(move |model| (scores, *model)));
     pairs.filter_map(|(scores, model)| of(scores, model)).collect()
 }
 
+/// The best, and the multiple of the scenarios that tells it from all rivals; infinite if a rival has the same F1.
 fn best_score(
     scores: &CategoryScores,
     units: &[UnitCounts],
     (model, criterion): (ModelId, Criterion),
     level: f64,
-) -> Option<BestScore> {
-    // A basis that has seen its scenarios is no rival of itself.
-    let has_held_out = |variant: &usize| {
-        let held_out = format!("{}{}", scores.variants[*variant], super::CROSS_VALIDATED);
-        scores.variants.contains(&held_out)
-    };
-    let places = (1..scores.variants.len())
-        .filter(|variant| !has_held_out(variant))
-        .filter_map(|variant| scores.index(variant, model, criterion));
+) -> Option<(BestScore, f64)> {
+    let places = scores.judged().into_iter().filter_map(|variant| scores.index(variant, model, criterion));
     let scored: Vec<(usize, f64)> = places.filter_map(|at| Some((at, f1(&scores.cells[at].counts)?))).collect();
     // The first of equals: parameterizations are in the order of the paper.
     let &(best, value) = scored.iter().rev().max_by(|a, b| a.1.total_cmp(&b.1))?;
@@ -101,5 +102,5 @@ fn best_score(
         }
     }
     let (interval, hidden) = (rate(best).interval(level), scores.cells[best].counts.fn_);
-    Some(BestScore { variant: name(best), f1: value, interval, hidden, rivals, more_data })
+    Some((BestScore { variant: name(best), f1: value, interval, hidden, rivals }, more_data))
 }

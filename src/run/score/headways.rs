@@ -48,16 +48,4 @@ impl HeadwayFailures {
         let lane = (variant * self.headways.len() + headway) * self.models.len() + model;
         self.failures[lane * Criterion::ALL.len() + criterion.index()]
     }
-
-    /// Rows ordered by variant, headway, model and criterion.
-    pub fn rows(&self) -> impl Iterator<Item = (&str, Headway, ModelId, Criterion, u64)> {
-        let lanes = self.variants.iter().flat_map(move |variant| {
-            let starts = self.headways.iter().map(move |&headway| (variant, headway));
-            starts.flat_map(|(variant, headway)| self.models.iter().map(move |&model| (variant, headway, model)))
-        });
-        lanes.zip(self.failures.chunks(Criterion::ALL.len())).flat_map(|((variant, headway, model), failures)| {
-            let counts = Criterion::ALL.into_iter().zip(failures);
-            counts.map(move |(criterion, &failures)| (variant.as_str(), headway, model, criterion, failures))
-        })
-    }
 }

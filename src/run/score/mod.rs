@@ -9,7 +9,6 @@ mod best;
 mod claims;
 mod difference;
 mod headways;
-mod mean;
 mod paper_claims;
 mod published;
 mod statistic;
@@ -18,7 +17,6 @@ pub use best::{Best, BestScore, best_parameterizations};
 pub use claims::{ClaimResult, ClaimRow, ClaimVerdict, check_claims};
 pub use difference::{Contrast, ScenarioRate, ScoreInterval, min_contrast};
 pub use headways::HeadwayFailures;
-pub use mean::{MeanF1, equal_f1, pareto_front};
 pub use paper_claims::Claim;
 pub use published::{Misfit, PublishedFailures, published_failures, published_lvd_f1};
 pub use statistic::Statistic;
@@ -79,21 +77,6 @@ pub fn f1_interval<'a>(
     is_enough.then(|| ScenarioRate::f1(scenarios).interval(options.confidence))
 }
 
-/// The interval of a share of hits among all, from the counts of each scenario as clusters.
-///
-/// `None` if fewer than [`ScoreOptions::min_failures`] scenarios have any.
-fn share_interval<'a>(
-    scenarios: impl Iterator<Item = &'a Confusion<u32>>,
-    missed: fn(&Confusion<u32>) -> u32,
-    options: &ScoreOptions,
-) -> Option<ScoreInterval> {
-    let all = |c: &Confusion<u32>| u64::from(c.tp) + u64::from(missed(c));
-    let with_any = scenarios.filter(|c| all(c) > 0);
-    let (runs, hits): (Vec<u64>, Vec<u64>) = with_any.map(|c| (all(c), u64::from(c.tp))).unzip();
-    let is_enough = runs.len() >= options.min_failures.max(1) as usize;
-    is_enough.then(|| ScenarioRate::new(runs, hits).interval(options.confidence))
-}
-
 /// One cell of the table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScoreCell {
@@ -107,10 +90,6 @@ pub struct ScoreCell {
     pub counts: Confusion,
     /// Interval of F1 over scenarios; `None` if S fails in fewer than [`ScoreOptions::min_failures`] of them.
     pub f1_interval: Option<ScoreInterval>,
-    /// Interval of the recall over scenarios; `None` if S fails in too few of them.
-    pub recall_interval: Option<ScoreInterval>,
-    /// Interval of the precision over scenarios; `None` if S' fails in too few of them.
-    pub precision_interval: Option<ScoreInterval>,
     /// Number of scenarios in which S fails from some headway.
     pub failing_scenarios: u64,
 }
@@ -151,6 +130,18 @@ impl CategoryScores {
     /// Number of scenarios in which S fails a criterion with a model; 0 for a model that was not run.
     pub fn failing_scenarios(&self, model: ModelId, criterion: Criterion) -> u64 {
         self.index(0, model, criterion).and_then(|at| self.cells.get(at)).map_or(0, |cell| cell.failing_scenarios)
+    }
+
+    /// Variants by which parameterizations are judged: a basis that has seen the scenarios that it replays is none where
+    /// there is one that has not.
+    pub fn judged(&self) -> Vec<usize> {
+        let has_held_out = |at: &usize| self.variants.contains(&format!("{}{CROSS_VALIDATED}", self.variants[*at]));
+        (1..self.variants.len()).filter(|at| !has_held_out(at)).collect()
+    }
+
+    /// Whether decompositions are judged on scenarios that they have not seen.
+    pub fn is_cross_validated(&self) -> bool {
+        self.variants.iter().any(|variant| variant.ends_with(CROSS_VALIDATED))
     }
 
     /// Index of a variant by its name.
@@ -210,8 +201,6 @@ pub fn score(plan: &LanePlan, partial: &Partial, options: &ScoreOptions) -> Resu
                     criterion: Criterion::ALL[at % criteria],
                     counts: totals[at],
                     failing_scenarios: counts.clone().filter(|c| c.tp + c.fn_ > 0).count() as u64,
-                    recall_interval: share_interval(counts.clone(), |c| c.fn_, options),
-                    precision_interval: share_interval(counts.clone(), |c| c.fp, options),
                     f1_interval: f1_interval(counts, options),
                 }
             })

@@ -23,6 +23,8 @@ pub struct StudyCases {
     pub(crate) outline: LanePlan,
     /// The decompositions, one per block that has one.
     pub(crate) reductions: Vec<Option<Reduction>>,
+    /// Those of a cross-validation, one per fold.
+    pub(super) folds: Vec<Vec<Reduction>>,
     /// Unit of the first scenario held.
     pub(crate) first_held: u64,
     pub(crate) held: Vec<Scenario>,
@@ -48,9 +50,9 @@ impl StudyCases {
         &self.left_out
     }
 
-    /// Whether S' are given as series.
-    pub(super) fn has_given(&self) -> bool {
-        self.head.blocks.iter().any(|block| !block.replays.is_empty())
+    /// Whether S' are given as series or cross-validated.
+    pub(super) fn has_others(&self) -> bool {
+        self.head.blocks.iter().any(|block| block.others().next().is_some())
     }
 
     /// The units whose scenarios are held.
@@ -156,7 +158,7 @@ impl StudyCases {
             let ids = parameterizations(block.category, self.reductions[at].is_some());
             let scenarios = inside.filter_map(|unit| self.scenario(block.first_unit + unit));
             let steps: f64 = scenarios.map(|scenario| steps_of(scenario.duration_s(), grid) as f64).sum();
-            steps * entries_per_step(block.category, ids, self.head.blocks[at].replays.len())
+            steps * entries_per_step(block.category, ids, self.head.blocks[at].others().count())
         };
         self.outline.segments(units).into_iter().map(of_segment).sum()
     }
@@ -170,6 +172,12 @@ impl StudyCases {
         let ids: Vec<Parameterization> = parameterizations(block.category, reduction.is_some()).collect();
         let grid = TimeGrid::of(&self.outline.profile);
         let mut cases = cases_of(scenario, &ids, reduction, grid, &self.head.parameterization)?;
+        if !self.folds[at].is_empty() {
+            let fold = scenario.fold.and_then(|fold| self.folds[at].get(fold));
+            let options = &self.head.parameterization;
+            let held_out = decompositions(block.category).map(|id| id.case(scenario, grid, options, fold));
+            cases.extend(held_out.collect::<Result<Vec<_>>>()?);
+        }
         let sizes = Sizes::of(scenario);
         for replay in &scenario.replays {
             cases.push(replay.case(block.category, &sizes, grid)?);
@@ -181,6 +189,11 @@ impl StudyCases {
 /// The parameterizations of a category, with or without those that need a decomposition.
 pub(crate) fn parameterizations(category: Category, has_reduction: bool) -> impl Iterator<Item = Parameterization> {
     Parameterization::of(category).filter(move |id| id.features().is_some() || has_reduction)
+}
+
+/// Those of them that need one.
+pub(super) fn decompositions(category: Category) -> impl Iterator<Item = Parameterization> {
+    Parameterization::of(category).filter(|id| id.coefficients().is_some())
 }
 
 /// Maximum number of entries of the cases in memory at once, for any time step: 2 GiB.

@@ -1,16 +1,11 @@
-//! S' given as series: of other programs, and of decompositions that have not seen the scenario they replay.
+//! S' of other programs, given as series.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use rayon::prelude::*;
-
-use super::folds::folds;
 use crate::score::CROSS_VALIDATED;
 use lanesweep_model::plausibility::Implausible;
-use lanesweep_model::scenario::parameterization::{
-    Parameterization, ParameterizationOptions, ReducedScenario, Reduction,
-};
+use lanesweep_model::scenario::parameterization::{Parameterization, ReducedScenario};
 use lanesweep_model::scenario::{Category, Scenario, ScenarioFile, read_scenario_file, usable};
 use lanesweep_support::{Error, Place, Result, readable};
 
@@ -122,6 +117,33 @@ impl ExternalReplay {
             let (file, times, category) = (path.display(), readable::value(least), self.category.label());
             tracing::warn!("{file}: every S' ({category}) lasts {times} times as long as its scenario: check `fps`");
         }
+        let file = path.display();
+        let category = self.category.label();
+        let mut shorter_s: Vec<f64> = pairs.iter().map(|(s, own)| s.duration_s() - own.duration_s).collect();
+        shorter_s.sort_by(f64::total_cmp);
+        let by_s = shorter_s.get(shorter_s.len() / 2).copied().unwrap_or(0.0);
+        let as_much = shorter_s.iter().filter(|s| (*s - by_s).abs() < 0.01).count();
+        if by_s > 0.1 && as_much > 2 && 4 * as_much > 3 * pairs.len() {
+            let by_s = readable::value(by_s);
+            tracing::warn!(
+                "{file}: {as_much} S' ({category}) are {by_s} s shorter than their scenarios: their first or last samples are missing"
+            );
+        }
+        let is_same =
+            |(s, own): &(&Scenario, &ReducedScenario)| s.target.v == own.v && (own.y.is_empty() || s.target.y == own.y);
+        if pairs.iter().all(is_same) {
+            tracing::warn!("{file}: every S' ({category}) has the series of its scenario: it is S itself");
+        }
+        let widest = |y: &[f64]| y.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
+        let reach =
+            |of: &dyn Fn(&Scenario, &ReducedScenario) -> f64| pairs.iter().map(|(s, own)| of(s, own)).sum::<f64>();
+        let times = reach(&|_, own| widest(&own.y)) / reach(&|s, _| widest(&s.target.y));
+        if self.category != Category::Lvd && !(0.7..=1.4).contains(&times) {
+            let times = readable::value(times);
+            tracing::warn!(
+                "{file}: S' ({category}) move {times} times as far to the side as their scenarios: check the unit of y"
+            );
+        }
         let first = |of: &[f64]| of.first().copied().unwrap_or(0.0);
         // What no parameterization changes.
         type Differs<'a> = &'a dyn Fn(&Scenario, &ReducedScenario) -> bool;
@@ -169,30 +191,4 @@ impl ExternalReplay {
         }
         Ok(())
     }
-}
-
-/// S' of every decomposition of the paper, each scenario by a basis of the other folds.
-///
-/// # Errors
-/// [`Error::Input`] for too few scenarios; [`Error::Usage`] for folds out of range.
-pub(super) fn held_out(
-    category: Category,
-    kept: &[&Scenario],
-    options: &ParameterizationOptions,
-    count: usize,
-) -> Result<Vec<ExternalReplay>> {
-    let of = folds(kept, count)?;
-    let train = |fold: usize| -> Vec<&Scenario> {
-        kept.iter().zip(&of).filter(|(_, of)| **of != fold).map(|(scenario, _)| *scenario).collect()
-    };
-    let fit = |fold: usize| Reduction::fit(category, &train(fold), options);
-    let fitted: Vec<Reduction> = (0..count).into_par_iter().map(fit).collect::<Result<_>>()?;
-    let replay = |(key, d): (&str, usize)| {
-        let reduced =
-            kept.iter().zip(&of).map(|(scenario, fold)| Ok((scenario.id.clone(), fitted[*fold].reduce(scenario, d)?)));
-        let key = format!("{key}{CROSS_VALIDATED}");
-        Ok(ExternalReplay { category, key, scenarios: reduced.collect::<Result<_>>()? })
-    };
-    let decompositions = Parameterization::of(category).filter_map(|id| Some((id.key, id.coefficients()?)));
-    decompositions.map(replay).collect()
 }

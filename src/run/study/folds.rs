@@ -2,18 +2,22 @@
 
 use std::collections::BTreeMap;
 
-use lanesweep_model::scenario::Scenario;
+use rayon::prelude::*;
+
+use lanesweep_model::scenario::parameterization::{ParameterizationOptions, Reduction};
+use lanesweep_model::scenario::{Category, Scenario};
 use lanesweep_support::{Error, Place, Result};
 
-/// The fold of each scenario, below `count`. Recordings go to the fold with the fewest scenarios, the largest first. Fewer
-/// recordings than folds are cut into as many stretches of time.
+/// The fold of each scenario, below `count` or the number of scenarios. Recordings go to the fold with the fewest scenarios,
+/// the largest first. Fewer recordings than folds are cut into as many stretches of time.
 ///
 /// # Errors
-/// [`Error::Usage`] for fewer than two folds or than scenarios.
-pub(super) fn folds(scenarios: &[&Scenario], count: usize) -> Result<Vec<usize>> {
-    if count < 2 || scenarios.len() < count {
-        let problem = format!("{} scenarios cannot be divided into {count} folds", scenarios.len());
-        return Err(Error::usage(Place::item("[study] folds"), problem, "use fewer folds, or more data"));
+/// [`Error::Input`] for fewer than two scenarios.
+fn folds(scenarios: &[&Scenario], count: usize) -> Result<Vec<usize>> {
+    let count = count.min(scenarios.len());
+    if count < 2 {
+        let help = "use more data; results of decompositions are in sample";
+        return Err(Error::input(Place::item("cross-validation"), "it needs two scenarios", help));
     }
     let mut recordings: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
     for (at, scenario) in scenarios.iter().enumerate() {
@@ -36,4 +40,24 @@ pub(super) fn folds(scenarios: &[&Scenario], count: usize) -> Result<Vec<usize>>
         members.into_iter().for_each(|at| of[at] = fold);
     }
     Ok(of)
+}
+
+/// The fold of each scenario, and the decomposition of all folds but each.
+///
+/// # Errors
+/// [`Error::Input`] for too few scenarios.
+pub(super) fn cross_validated(
+    category: Category,
+    kept: &[&Scenario],
+    options: &ParameterizationOptions,
+    count: usize,
+) -> Result<(Vec<usize>, Vec<Reduction>)> {
+    let of = folds(kept, count)?;
+    let train = |fold: usize| -> Vec<&Scenario> {
+        kept.iter().zip(&of).filter(|(_, of)| **of != fold).map(|(scenario, _)| *scenario).collect()
+    };
+    let count = of.iter().max().map_or(0, |last| last + 1);
+    let fit = |fold: usize| Reduction::fit(category, &train(fold), options);
+    let fitted = (0..count).into_par_iter().map(fit).collect::<Result<_>>()?;
+    Ok((of, fitted))
 }

@@ -21,7 +21,7 @@ pub use external_replays::ExternalReplay;
 pub use plan::{StudyOptions, outline_study, plan_study};
 pub use plan_file::{StudyHead, plan_of_parts};
 use provenance::category_provenance;
-pub use provenance::{CategoryProvenance, ParameterHistogram, StudyProvenance};
+pub use provenance::{CategoryProvenance, StudyProvenance};
 
 pub use reference::{Difference, ReferenceComparison};
 pub use robustness::robust_lanes;
@@ -36,6 +36,7 @@ use crate::parts::{Shard, read_sealed_line, seal, units_of};
 use crate::score::{ScoreOptions, ScoreTable, score};
 use lanesweep_engine::{LanePlan, Partial};
 use lanesweep_model::profile::Profile;
+use lanesweep_model::scenario::Category;
 use lanesweep_support::run_folder::Results;
 use lanesweep_support::{Error, Place, Result, option};
 use lanesweep_traffic::mining::{Collection, MiningOptions, counts, counts_text};
@@ -132,6 +133,15 @@ impl StudyBuilder<'_> {
                 format!("use more recordings, or relax the filters ([mining] in {})", option("config")),
             ));
         }
+        let kept = collection.scenarios.iter().filter(|s| s.kept && s.category != Category::Lvd);
+        let mut widths_m: Vec<f64> = kept.map(|scenario| scenario.lane_width).collect();
+        widths_m.sort_by(f64::total_cmp);
+        let (width_m, moved_m) = (widths_m.get(widths_m.len() / 2).copied(), options.parameterization.lane_change_m);
+        if let Some(width_m) = width_m.filter(|width_m| !(0.7..=1.4).contains(&(moved_m / width_m))) {
+            tracing::warn!(
+                "`parameterization.lane_change_m` is {moved_m} m, the median lane {width_m} m wide: a lane change moves from middle to middle"
+            );
+        }
         let facts = StudyProvenance {
             data,
             synthetic: collection.synthetic,
@@ -139,7 +149,7 @@ impl StudyBuilder<'_> {
             reference: self.reference,
             incomplete: !collection.problems.is_empty(),
             scenario_file_sha256: self.scenario_file_sha256,
-            categories: category_provenance(collection, &cases, &options)?,
+            categories: category_provenance(collection, &cases)?,
             left_out: collection.problems.iter().chain(cases.left_out()).map(Error::to_string).collect(),
             notes: collection.notes.clone(),
             recordings: collection.recordings.clone(),

@@ -1,7 +1,8 @@
 //! Plans a study: mined scenarios and options become cases; sizes are limited before anything is allocated.
 
 use crate::study::cases::{StudyCases, entries_per_step, parameterizations};
-use crate::study::external_replays::{ExternalReplay, held_out};
+use crate::study::external_replays::ExternalReplay;
+use crate::study::folds::cross_validated;
 use crate::study::plan_file::{BlockHead, StudyHead, stripped};
 use lanesweep_engine::plan::{Headway, LanePlan};
 use lanesweep_model::driver::ModelId;
@@ -95,35 +96,39 @@ pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyO
             }
             Err(error) => return Err(error),
         };
-        let mut replays = Vec::new();
+        let (mut fold_of, mut folds) = (Vec::new(), Vec::new());
         if let Some(count) = options.folds.filter(|_| reduction.is_some()) {
-            match held_out(category, &kept, parameterization, count) {
-                Ok(made) => replays.extend(made),
+            match cross_validated(category, &kept, parameterization, count) {
+                Ok(made) => (fold_of, folds) = made,
                 Err(error @ Error::Input { .. }) => left_out.push(error),
                 Err(error) => return Err(error),
             }
         }
-        replays.extend(options.external.iter().filter(|replay| replay.category == category).cloned());
+        let replays: Vec<&ExternalReplay> =
+            options.external.iter().filter(|replay| replay.category == category).collect();
         let given = |scenario: &Scenario| -> Result<Vec<ReducedScenario>> {
-            let of = |replay: &ExternalReplay| replay.scenarios.get(&scenario.id).cloned();
+            let of = |replay: &&ExternalReplay| replay.scenarios.get(&scenario.id).cloned();
             let all: Option<Vec<ReducedScenario>> = replays.iter().map(of).collect();
             all.ok_or_else(|| Error::Internal(format!("an S' of scenario {} is missing", scenario.id)))
         };
-        let per_step = entries_per_step(category, parameterizations(category, reduction.is_some()), replays.len());
+        let keys = replays.iter().map(|replay| replay.key.clone()).collect();
+        let block = BlockHead::new(category, kept.len() as u64, reduction.as_ref(), &folds, keys);
+        let ids = parameterizations(category, reduction.is_some());
+        let per_step = entries_per_step(category, ids, block.others().count());
         entries += kept.iter().map(|s| steps_of(s.duration_s(), grid) as f64).sum::<f64>() * per_step;
         let recorded = if category == Category::Lvd { 1.0 } else { 2.0 };
         values += kept.iter().map(|s| s.target.v.len() as f64).sum::<f64>() * recorded;
         check_size(entries, values, dt_s)?;
         held.reserve_exact(kept.len());
-        for scenario in &kept {
+        for (at, scenario) in kept.iter().enumerate() {
             if category == Category::CutOut {
                 vehicle_ahead(scenario)?;
             }
             let gap_m = is_observed.then(|| scenario.start_gap_m()).transpose()?;
-            held.push(Scenario { replays: given(scenario)?, ..stripped(scenario, gap_m) });
+            let (replays, fold) = (given(scenario)?, fold_of.get(at).copied());
+            held.push(Scenario { replays, fold, ..stripped(scenario, gap_m) });
         }
-        let keys = replays.into_iter().map(|replay| replay.key).collect();
-        blocks.push(BlockHead::new(category, kept.len() as u64, reduction.as_ref(), keys));
+        blocks.push(block);
         reductions.push(reduction);
     }
     let head = StudyHead::new(

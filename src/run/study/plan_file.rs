@@ -5,6 +5,8 @@
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use super::cases::decompositions;
+use crate::score::CROSS_VALIDATED;
 use lanesweep_engine::plan::{Headway, LanePlan};
 use lanesweep_engine::version::Canonical;
 use lanesweep_model::driver::ModelId;
@@ -86,26 +88,36 @@ pub(crate) struct BlockHead {
     pub(super) units: u64,
     /// `None` if there were too few scenarios for a decomposition.
     pub(super) basis: Option<SvdBasis>,
+    /// Decompositions of a cross-validation: each of all folds but its own.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) folds: Vec<SvdBasis>,
     /// Names of the S' that the scenarios hold as series.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) replays: Vec<String>,
 }
 
 impl BlockHead {
-    /// Keeps the part of the decomposition that cases are made with.
+    /// Keeps the part of the decompositions that cases are made with.
     pub(crate) fn new(
         category: Category,
         units: u64,
         reduction: Option<&Reduction>,
+        folds: &[Reduction],
         replays: Vec<String>,
     ) -> BlockHead {
         let used = Parameterization::max_coefficients(category);
-        let basis = reduction.map(|reduction| {
+        let basis = |reduction: &Reduction| {
             let SvdBasis { weights, mean, directions, rows, .. } = reduction.basis.clone();
             let directions = directions.into_iter().take(used).collect();
             SvdBasis { weights, mean, directions, rows, singular_values: Vec::new() }
-        });
-        BlockHead { category, units, basis, replays }
+        };
+        BlockHead { category, units, basis: reduction.map(basis), folds: folds.iter().map(basis).collect(), replays }
+    }
+
+    /// Names of the S' that are made neither by features nor by the decomposition of all scenarios.
+    pub(super) fn others(&self) -> impl Iterator<Item = String> {
+        let held_out = decompositions(self.category).filter(|_| !self.folds.is_empty());
+        held_out.map(|id| format!("{}{CROSS_VALIDATED}", id.key)).chain(self.replays.iter().cloned())
     }
 }
 
@@ -122,7 +134,8 @@ pub fn plan_of_parts(
     scenarios: &[Scenario],
 ) -> Result<LanePlan> {
     let units = |of: Category| scenarios.iter().filter(|scenario| scenario.category == of).count() as u64;
-    let block = |(of, reduction): &(Category, Reduction)| BlockHead::new(*of, units(*of), Some(reduction), Vec::new());
+    let block =
+        |(of, reduction): &(Category, Reduction)| BlockHead::new(*of, units(*of), Some(reduction), &[], Vec::new());
     let blocks = categories.iter().map(block).collect();
     let held: Vec<Scenario> = scenarios.iter().map(|scenario| stripped(scenario, None)).collect();
     let head = StudyHead::new(profile, models, headways, options, blocks, &held)?;

@@ -18,24 +18,24 @@ impl StudyHead {
     /// The study with some of its scenarios; `first_held` is the unit of the first one.
     pub(crate) fn with_scenarios(self, first_held: u64, held: Vec<Scenario>) -> Result<StudyCases> {
         let (mut ids, end_held) = (held.iter().map(|scenario| scenario.id.clone()), first_held + held.len() as u64);
-        let (mut first, mut blocks, mut reductions) = (0, Vec::new(), Vec::new());
+        let (mut first, mut blocks, mut reductions, mut folds) = (0, Vec::new(), Vec::new(), Vec::new());
         for block in &self.blocks {
             let (from, end) = (first_held.clamp(first, first + block.units), first + block.units);
             let names: Vec<String> = ids.by_ref().take((end_held.clamp(from, end) - from) as usize).collect();
             let variants = parameterizations(block.category, block.basis.is_some()).map(|id| id.key.to_owned());
-            let variants = variants.chain(block.replays.iter().cloned());
+            let variants = variants.chain(block.others());
             let variants = std::iter::once("S".to_owned()).chain(variants).collect();
             blocks.push(Block::new(block.category, Units::Held(block.units, from - first, names.into()), variants));
-            let basis = block.basis.clone();
             let of_basis = |basis| Reduction::from_parts(block.category, basis, &self.parameterization);
-            reductions.push(basis.map(of_basis).transpose()?);
+            reductions.push(block.basis.clone().map(of_basis).transpose()?);
+            folds.push(block.folds.iter().cloned().map(of_basis).collect::<Result<_>>()?);
             first = end;
         }
         let (profile, models, headways) = (self.profile.clone(), self.models.clone(), self.headways.clone());
         let hash = self.plan_sha256.clone();
         // Counts and keys; lanes are run on its windows.
         let outline = LanePlan::with_hash(hash, profile, models, headways, blocks, Arc::new(CaseTable::new([])))?;
-        Ok(StudyCases { head: self, outline, reductions, first_held, held, left_out: Vec::new() })
+        Ok(StudyCases { head: self, outline, reductions, folds, first_held, held, left_out: Vec::new() })
     }
 
     /// Reads the study with some of its scenarios, whose lines begin at the file's present position. `wanted` selects

@@ -244,13 +244,13 @@ impl Trust {
             _ => None,
         });
         let whose = match (few, self.density()) {
-            _ if self.draws() == Verdict::Unusable => return "for nothing: the sample missed too much".to_owned(),
-            _ if self.data() == "none" => return "as an upper bound only".to_owned(),
+            _ if self.draws() == Verdict::Unusable => return "nothing: too much missed".to_owned(),
+            _ if self.data() == "none" => return "upper bound only".to_owned(),
             (Some(scenarios), _) if scenarios < 2.0 => "carried by one scenario".to_owned(),
             (Some(scenarios), _) => format!("carried by {:.0} scenarios", scenarios.floor()),
-            (None, "agrees") => "as the recordings' rate".to_owned(),
-            (None, "differs") => "as this density's rate: the recordings differ".to_owned(),
-            _ => "as this density's rate alone".to_owned(),
+            (None, "agrees") => "recordings' rate".to_owned(),
+            (None, "differs") => "recordings differ".to_owned(),
+            _ => "density's rate".to_owned(),
         };
         if self.draws() == Verdict::Sound { whose } else { whose + ", few draws" }
     }
@@ -302,9 +302,9 @@ mod tests {
         let of = |warnings: Vec<Warning>| Trust { warnings };
         let none = of(vec![]);
         assert_eq!((none.draws(), none.density(), none.data()), (Verdict::Sound, "agrees", "enough"));
-        assert_eq!(none.usable(), "as the recordings' rate");
+        assert_eq!(none.usable(), "recordings' rate");
         let bound = of(vec![Warning::NoFailures, Warning::NotCompared]);
-        assert_eq!((bound.data(), bound.usable()), ("none", "as an upper bound only".to_owned()));
+        assert_eq!((bound.data(), bound.usable()), ("none", "upper bound only".to_owned()));
         let few = of(vec![Warning::FewScenarios { scenarios: 2.0 }, Warning::NotCompared]);
         assert_eq!((few.draws(), few.density(), few.data()), (Verdict::Sound, "open", "few"));
         assert_eq!(few.usable(), "carried by 2 scenarios");

@@ -18,7 +18,7 @@ mod svd;
 pub use kinematic::{Kinematic, LaneChange, SpeedProfile};
 pub use options::{AfterDuration, LateralStart, ParameterizationOptions, SeriesScale, SvdFit, SvdLateral};
 pub use parameter::{MAX_DURATION_S, MIN_DURATION_S, Parameter, Variable};
-pub use reduction::{ModeShape, ReducedScenario, ReducedSeries, Reduction};
+pub use reduction::{ReducedScenario, ReducedSeries, Reduction};
 pub use series::steps_of;
 pub use series::{TimeGrid, recorded_case};
 pub use sizes::vehicle_ahead;

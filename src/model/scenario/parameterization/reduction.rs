@@ -9,11 +9,8 @@ use super::parameter::{MIN_DURATION_S, Variable};
 use super::series::{SeriesCase, TimeGrid, at};
 use super::sizes::{Sizes, vehicle_ahead};
 use super::svd::{SvdBasis, fit_svd};
-use crate::scenario::{Case, Category, Scenario, Side};
+use crate::scenario::{Case, Category, Scenario};
 use lanesweep_support::{Error, Result};
-
-/// Number of directions whose mode shapes are shown.
-const SHOWN: usize = 3;
 
 /// A series in the vector of a decomposition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -173,64 +170,6 @@ impl Reduction {
     pub fn case(&self, scenario: &Scenario, d: usize, grid: impl Into<TimeGrid>) -> Result<Case> {
         self.reduce(scenario, d)?.case(self.category, &Sizes::of(scenario), grid.into())
     }
-
-    /// The series of the decomposition with their shapes over the given scenarios. Left-positive series use only the
-    /// side with more scenarios: the mean of both sides would drive in the middle, where no vehicle drove.
-    ///
-    /// # Errors
-    /// [`Error::Input`] for a scenario that cannot be converted to a vector.
-    pub fn mode_shapes(&self, scenarios: &[&Scenario]) -> Result<Vec<ModeShape>> {
-        let target = match self.category {
-            Category::CutIn => "cutter",
-            Category::CutOut => "cutting-out vehicle",
-            Category::Lvd => "leader",
-        };
-        let is_signed =
-            self.options.svd_lateral == SvdLateral::Signed && self.series_column(ReducedSeries::Lateral).is_some();
-        let left = scenarios.iter().filter(|s| s.side == Side::Left).count();
-        let side = if 2 * left >= scenarios.len() { Side::Left } else { Side::Right };
-        let of_side = scenarios.iter().filter(|s| !is_signed || s.side == side);
-        let vectors = of_side.map(|s| self.vector(s)).collect::<Result<Vec<_>>>()?;
-        let shown = SHOWN.min(self.basis.directions.len());
-        let of_side = scenarios.iter().filter(|s| !is_signed || s.side == side);
-        let coefficients: Vec<Vec<f64>> = of_side.map(|s| self.coefficients(s, shown)).collect::<Result<_>>()?;
-        let mean = means(&vectors);
-        let centre = means(&coefficients);
-        let of_direction = |j: usize| {
-            let squares = coefficients.iter().map(|c| (c[j] - centre[j]) * (c[j] - centre[j])).sum::<f64>();
-            let deviation = (squares / coefficients.len().max(1) as f64).sqrt();
-            let columns = mean.iter().zip(&self.basis.directions[j]).zip(&self.basis.weights);
-            columns.map(|((z, v), w)| z + deviation * v / w).collect::<Vec<f64>>()
-        };
-        let along = (0..shown).map(of_direction).collect::<Vec<_>>();
-        let (mirror, of) = match (is_signed, side) {
-            (false, _) => (1.0, ""),
-            (true, Side::Left) => (1.0, ", on the left"),
-            (true, Side::Right) => (-1.0, ", on the right"),
-        };
-        let instants = self.options.svd_instants;
-        if vectors.is_empty() {
-            return Ok(Vec::new());
-        }
-        let shape = |(at, series): (usize, &ReducedSeries)| {
-            let sign = if *series == ReducedSeries::Lateral { mirror } else { 1.0 };
-            let part =
-                |z: &[f64]| z[at * instants..(at + 1) * instants].iter().map(|value| sign * value).collect::<Vec<_>>();
-            let (quantity, unit) = match series {
-                ReducedSeries::Lateral => (format!("lateral position of the {target}{of}"), "m"),
-                ReducedSeries::TargetSpeed => (format!("speed of the {target}"), "m/s"),
-                ReducedSeries::LeadSpeed => ("speed of the vehicle ahead".to_owned(), "m/s"),
-            };
-            let along = along.iter().map(|z| part(z)).collect();
-            let envelope = (0..instants).map(|instant| {
-                let mut here: Vec<f64> = vectors.iter().map(|z| sign * z[at * instants + instant]).collect();
-                here.sort_by(f64::total_cmp);
-                [0.05, 0.95].map(|share| here[(share * (here.len() - 1) as f64).round() as usize])
-            });
-            ModeShape { quantity, unit: unit.to_owned(), mean: part(&mean), envelope: envelope.collect(), along }
-        };
-        Ok(layout(self.category).0.iter().enumerate().map(shape).collect())
-    }
 }
 
 impl ReducedScenario {
@@ -250,28 +189,6 @@ impl ReducedScenario {
         }
         .on(grid, sizes)
     }
-}
-
-/// The mean of every column; empty without rows.
-fn means(rows: &[Vec<f64>]) -> Vec<f64> {
-    let columns = rows.first().map_or(0, Vec::len);
-    (0..columns).map(|c| rows.iter().map(|row| row[c]).sum::<f64>() / rows.len() as f64).collect()
-}
-
-/// One series of the mean scenario and its variation along the first directions, in the units of the recording.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ModeShape {
-    /// Name, such as `lateral position of the cutter`.
-    pub quantity: String,
-    /// Unit.
-    pub unit: String,
-    /// The mean, over equidistant instants of [0, T].
-    pub mean: Vec<f64>,
-    /// Between these lie the middle nine tenths of the scenarios, at each instant.
-    pub envelope: Vec<[f64; 2]>,
-    /// The mean plus one standard deviation of coefficient j along direction j, for the first directions.
-    pub along: Vec<Vec<f64>>,
 }
 
 /// Converts a scenario to a vector: series at n_t equidistant points over [0, T], then the extras.

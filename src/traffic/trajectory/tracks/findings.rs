@@ -1,6 +1,6 @@
 //! What contradicts itself in a recording: units, axes, motion.
 
-use super::offsets::slope_within;
+use super::offsets::{slope_within, way};
 use super::preset::{Preset, Side};
 use super::road::{median, range};
 use super::understanding::{Understanding, median_of};
@@ -32,6 +32,8 @@ const MIN_RASTER_M: f64 = 0.2;
 const MAX_RASTER: f64 = 0.25;
 /// Widths of the lanes of motorways, m.
 const USUAL_LANES_M: std::ops::RangeInclusive<f64> = 2.7..=4.6;
+/// Length and width that the median car exceeds, m.
+const SMALL_CAR_M: (f64, f64) = (3.3, 1.4);
 /// Fewer vehicles prove nothing.
 pub(super) const MIN_VEHICLES: usize = 5;
 
@@ -108,6 +110,9 @@ impl Understanding {
                 self.find(self.seen.has_wrong_ratio, text);
             }
         }
+        if !self.seen.has_wrong_ratio {
+            self.check_groups(recording);
+        }
         let (delay, told) = (self.seen.delay, self.seen.acceleration);
         for (of, name) in delay.into_iter().zip(["speeds", "lateral speeds"]) {
             let is_late = of.slope().abs() > MAX_DELAY_S.max(4.0 * of.slope_error());
@@ -135,6 +140,36 @@ impl Understanding {
                 self.warn(format!(
                     "accelerations are {times} times the changes of speed (0.75 to 1.25 is usual): check whether they are missing for some vehicles, for braking, or have another sign in one direction; without the column they follow from speeds"
                 ));
+            }
+        }
+    }
+
+    /// Compares speeds with positions of each direction and class, of which another's may hide what is wrong.
+    fn check_groups(&mut self, recording: &Recording) {
+        let groups = (0..recording.carriageways.len()).map(|at| (Some(at), None));
+        let groups = groups.chain([VehicleClass::Car, VehicleClass::Truck].map(|class| (None, Some(class))));
+        for (carriageway, class) in groups {
+            let is_in = |of: &&Track| {
+                carriageway.is_none_or(|at| of.carriageway == at) && class.is_none_or(|class| of.class == class)
+            };
+            let ratio = |of: &Track| {
+                let driven_m =
+                    of.v_s_mps.windows(2).map(|v| 0.5 * (v[0] + v[1])).sum::<f64>() / recording.frame_rate_hz;
+                (driven_m > 20.0).then(|| (of.s_m[of.len() - 1] - of.s_m[0]) / driven_m)
+            };
+            let mut ratios: Vec<f64> = recording.tracks.iter().filter(is_in).filter_map(ratio).collect();
+            if ratios.len() < MIN_VEHICLES {
+                continue;
+            }
+            let (ratio, error) = median_and_error(&mut ratios);
+            if (ratio - 1.0).abs() > MAX_SPEED_DIFFERENCE + 4.0 * error {
+                let who = match (carriageway, class) {
+                    (Some(at), _) => way(&recording.carriageways[at]),
+                    (_, Some(VehicleClass::Truck)) => "lorries",
+                    _ => "cars",
+                };
+                let times = significant(ratio, 3);
+                self.warn(format!("{who}: vehicles move {times} times as far as their speeds tell: the speeds of some vehicles have another unit or scale"));
             }
         }
     }
@@ -180,6 +215,27 @@ impl Understanding {
             if !quantity.is_plausible(middle) {
                 self.refuse(format!("the median vehicle: {}", quantity.describe(middle)));
             }
+        }
+        let sizes =
+            recording.tracks.iter().filter(|of| of.class == VehicleClass::Car).map(|of| (of.length_m, of.width_m));
+        let (mut lengths, mut widths): (Vec<f64>, Vec<f64>) = sizes.unzip();
+        let (long_m, wide_m) = (median(&mut lengths), median(&mut widths));
+        if lengths.len() >= MIN_VEHICLES && long_m < SMALL_CAR_M.0 && wide_m < SMALL_CAR_M.1 {
+            let (long_m, wide_m) = (significant(long_m, 3), significant(wide_m, 2));
+            self.warn(format!("cars are {long_m} m long and {wide_m} m wide (medians): are these half extents?"));
+        }
+        let mut lengths: Vec<f64> =
+            recording.tracks.iter().filter(|of| of.class == VehicleClass::Truck).map(|of| of.length_m).collect();
+        lengths.sort_by(f64::total_cmp);
+        let longest_m = lengths.last().copied().unwrap_or(0.0);
+        let others = lengths.iter().filter(|length_m| **length_m < longest_m).count();
+        let distinct = lengths.chunk_by(|a, b| a == b).count();
+        // Simulated lorries have a few lengths, measured ones many, of which the largest is one's alone.
+        if lengths.len() - others > others.max(MIN_VEHICLES) && distinct > 2 {
+            self.warn(format!(
+                "most lorries are {} m long, and none is longer: were lengths cut off there?",
+                significant(longest_m, 3)
+            ));
         }
         let length_of = |class: VehicleClass| {
             let mut lengths: Vec<f64> =

@@ -67,7 +67,8 @@ impl Understanding {
         let shift = median(&mut offsets.iter().map(|(half_m, mean_m, _)| mean_m / half_m).collect::<Vec<f64>>());
         if shift.abs() >= MIN_EDGE && offsets.len() >= MIN_VEHICLES {
             let (shift, side) = (significant(shift.abs(), 2), if shift > 0.0 { "left" } else { "right" });
-            self.refuse(format!(
+            // Bands of a width may begin elsewhere.
+            self.find(self.seen.lane_sources.is_empty(), format!(
                 "{way}: half of the vehicles are at least {shift} half widths to the {side} of the middle of their lanes, so that boxes cross lane lines: y is that of another point of the box, or the lane lines are shifted"
             ));
             return;

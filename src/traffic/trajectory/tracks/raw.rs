@@ -19,8 +19,8 @@ use lanesweep_support::{Error, Place, Result};
 
 /// Maximum number of names of lanes, and of classes, of a recording; more are none.
 const MAX_NAMES: usize = 65_536;
-/// Maximum number of lines that Excel and Calc hold; they cut longer files.
-const SPREADSHEET_LINES: u64 = 1_048_576;
+/// Maximum numbers of lines that spreadsheets hold; they cut longer files.
+const SPREADSHEET_LINES: [u64; 2] = [65_536, 1_048_576];
 /// Times of day that fall by more begin again at midnight, s.
 const HALF_A_DAY_S: f64 = 43_200.0;
 
@@ -121,7 +121,7 @@ pub(super) fn read_table(file: &TrackFile, preset: &Preset) -> Result<(Vec<RawRe
         collecting.add(row)
     })?;
     let mut recordings = collecting.recordings;
-    if let Some(last) = recordings.last_mut().filter(|_| lines == SPREADSHEET_LINES) {
+    if let Some(last) = recordings.last_mut().filter(|_| SPREADSHEET_LINES.contains(&lines)) {
         last.notes.push(format!(
             "the file has {lines} lines, as many as a spreadsheet can hold: rows may be missing at its end; export it without one"
         ));
