@@ -87,7 +87,7 @@ def test_a_result_has_tables_figures_and_a_page(scenarios) -> None:
     assert frame["variant"].map(type).eq(str).all() and frame["failures"].dtype.kind == "i"
     assert "-cv" in "".join(frame["variant"].unique()) and set(frame["headway"]) == {"all", "0.6s", "1.2s"}
     shown = repr(result.table("results"))
-    assert shown.startswith(" ") and "Reg157" in shown and f"[{len(frame)} rows;" in shown
+    assert shown.startswith("category") and "Reg157" in shown and f"[{len(frame)} rows;" in shown
     assert max(map(len, shown.splitlines())) <= 120
     assert frame["f1"].dropna().between(0, 1).all()
     assert len(result.table("results")) == len(result.table("results").to_polars())
@@ -151,7 +151,7 @@ def test_errors_are_exceptions_with_place_and_help(tmp_path) -> None:
 def test_messages_go_to_logging(caplog, scenarios) -> None:
     with caplog.at_level(logging.INFO, "lanesweep"):
         lanesweep.study(scenarios=scenarios, thw=1.2, models="FSM", backend="cpu")
-    assert any("lanes on" in record.message for record in caplog.records)
+    assert any("runs on" in record.message for record in caplog.records)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals")
