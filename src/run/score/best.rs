@@ -22,7 +22,7 @@ pub struct Best {
     /// The result; `None` if S fails in fewer scenarios than [`super::ScoreOptions::min_failures`].
     pub score: Option<BestScore>,
     /// So many times as many scenarios would tell it from all rivals, or give a result, if nothing else changes. 1: these
-    /// do. `None`: more than [`MAX_TIMES`].
+    /// do. `None`: more than 20.
     pub data_for_decision: Option<f64>,
 }
 
