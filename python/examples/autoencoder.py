@@ -105,7 +105,14 @@ def main() -> None:
         external=external,
         out=given.out / "study",
     )
-    print((given.out / "study" / "tables" / "variants.csv").read_text(encoding="utf-8"))
+    # Mean F1 over drivers and criteria, of every description.
+    sums: dict[str, list[float]] = {}
+    with (given.out / "study" / "results.csv").open(encoding="utf-8") as lines:
+        for row in csv.DictReader(lines):
+            if row["headway"] == "all" and row["f1"]:
+                sums.setdefault(row["variant"], []).append(float(row["f1"]))
+    for variant, values in sums.items():
+        print(f"{variant}: {sum(values) / len(values):.3f}")
 
 
 if __name__ == "__main__":

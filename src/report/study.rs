@@ -12,11 +12,11 @@ use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::scenario::Category;
 use lanesweep_model::scenario::parameterization::Parameterization;
-use lanesweep_run::score::{Best, CategoryScores, Misfit, ScoreTable, f1, published_failures, published_lvd_f1};
+use lanesweep_run::score::{Best, Misfit, ScoreTable, f1, published_failures, published_lvd_f1};
 use lanesweep_run::study::{ReferenceComparison, Study, StudyEvaluation, StudyProvenance};
 use lanesweep_support::Result;
 use lanesweep_support::run_folder::{ResultFiles, Results, TABLES};
-use lanesweep_support::table::{Column, Digits, Table};
+use lanesweep_support::table::Table;
 use serde::Serialize;
 
 /// A study's complete report.
@@ -60,33 +60,6 @@ impl<'a> StudyReport<'a> {
         self.study.plan().lane_count()
     }
 
-    /// Error of the motions beside the mean F1 of every variant; `None` unless S' are given as series or cross-validated.
-    pub(super) fn given_table(&self) -> Option<Table> {
-        let rows =
-            self.evaluation.scores.categories.iter().zip(&self.facts().categories).flat_map(|(scores, facts)| {
-                let variants = facts.rmse.iter().enumerate().skip(1);
-                variants.map(move |(variant, rmse)| (scores, variant, *rmse))
-            });
-        let rows: Vec<(&CategoryScores, usize, f64)> = rows.collect();
-        let three = |name: String| Column::from(name).digits(Digits::Fixed(3)).null("-");
-        let data = if self.facts().synthetic { "synthetic" } else { "recorded" };
-        let table = Table::of(rows.iter())
-            .column("category", |(scores, ..)| scores.category.key())
-            .column("variant", |(scores, variant, _)| scores.variants[*variant].as_str())
-            .column(three("rmse".to_owned()), |(.., rmse)| *rmse)
-            .columns(
-                Criterion::ALL,
-                |criterion| three(format!("f1_{}", criterion.key())),
-                |(scores, variant, _), criterion| scores.mean_f1(*variant, criterion),
-            )
-            .column("data", |_| data)
-            .build()
-            .captioned(
-                "Cross-validation and given S': error of the motions in standard deviations, and F1 over the models",
-            );
-        (!rows.is_empty()).then_some(table)
-    }
-
     /// Start of the scenarios, in a few words.
     pub(super) fn headways_in_words(&self) -> String {
         match self.evaluation.scores.headways.len() {
@@ -106,7 +79,6 @@ impl<'a> StudyReport<'a> {
         results.add("results.csv", tables::result_records(&self.evaluation, data)?.csv().as_bytes())?;
         let mut table = |name: &str, table: Table| results.add(&format!("{TABLES}{name}.csv"), table.csv().as_bytes());
         table("claims", tables::claim_records(&self.evaluation.claims, data))?;
-        self.given_table().map_or(Ok(()), |given| table("variants", given))?;
         if self.facts().categories.iter().any(|of| !of.folds.is_empty()) {
             let folds = self.facts().categories.iter().flat_map(|of| &of.folds);
             let folds = Table::of(folds).column("id", |(id, _)| id.as_str()).column("fold", |(_, fold)| *fold);

@@ -34,11 +34,6 @@ impl StudyReport<'_> {
         }
         sections.extend(self.claims());
         sections.push(self.failures());
-        sections.extend(self.given_table().map(|table| {
-            let intro = "-cv: each scenario is replayed by a basis that was fitted on the other folds (tables/folds.csv): \
-                         whole recordings, or stretches of time if there are fewer recordings than folds.";
-            Section::new("given", "Cross-validation and given S'").intro(intro).tables([table])
-        }));
         sections.extend(self.comparison.as_ref().map(|comparison| {
             Section::new("reference", "Lane arithmetic against double precision")
                 .text(tables::reference_text(comparison))

@@ -3,7 +3,7 @@
 use lanesweep::model::plausibility::Implausible;
 use lanesweep::scenario::{Category, read_scenario_file};
 
-use crate::common::program::{done, ran, said, words};
+use crate::common::program::{done, ran, said, table as csv, words};
 
 #[test]
 fn s_prime_of_other_programs_and_of_bases_of_other_folds_are_scored() {
@@ -16,17 +16,22 @@ fn s_prime_of_other_programs_and_of_bases_of_other_folds_are_scored() {
     let study = "-q study --scenarios scenarios.jsonl --external";
     let external = study.replace("--external", "--categories cut-in --out study --external");
     done(dir.path(), &[&words(&external)[..], &["my same.v2.jsonl"]].concat());
-    let variants = std::fs::read_to_string(of("study/tables/variants.csv")).unwrap();
-    let row = |name: &str| variants.lines().find(|line| line.starts_with(&format!("cut_in,{name},"))).unwrap();
-    assert_eq!(row("my-same-v2"), "cut_in,my-same-v2,0,1,1,1,synthetic", "{variants}");
-    row("5-cv");
+    // F1 of every driver and criterion of a variant, where it is defined.
+    let scores = |folder: &str, category: &str, variant: &str| -> Vec<String> {
+        let rows = csv(&of(folder).join("results.csv")).into_iter();
+        let own =
+            rows.filter(|row| row["category"] == category && row["variant"] == variant && row["headway"] == "all");
+        own.map(|row| row["f1"].clone()).filter(|f1| !f1.is_empty()).collect()
+    };
+    let same = scores("study", "cut_in", "my-same-v2");
+    assert!(same.len() > 3 && same.iter().all(|f1| f1 == "1"), "{same:?}");
+    assert!(scores("study", "cut_in", "5-cv").iter().any(|f1| f1 != "1"));
     assert_eq!(std::fs::read_to_string(of("study/tables/folds.csv")).unwrap().lines().next(), Some("id,fold"));
     #[cfg(feature = "parquet")]
     {
         ran(dir.path(), "-q mine recordings --out as-parquet.parquet");
         ran(dir.path(), &format!("{study} as-parquet.parquet --out parquet"));
-        let variants = std::fs::read_to_string(of("parquet/tables/variants.csv")).unwrap();
-        assert!(variants.contains("lvd,as-parquet,0,1,1,1"), "{variants}");
+        assert!(scores("parquet", "lvd", "as-parquet").iter().all(|f1| f1 == "1"));
     }
     // Rows moved by one: S' of one scenario has the id of the next.
     let lines = std::fs::read_to_string(of("scenarios.jsonl")).unwrap();

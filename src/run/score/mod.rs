@@ -120,13 +120,6 @@ impl CategoryScores {
         Some((variant * self.models.len() + model) * Criterion::ALL.len() + criterion.index())
     }
 
-    /// Mean F1 of a variant over the models whose F1 is defined.
-    pub fn mean_f1(&self, variant: usize, criterion: Criterion) -> Option<f64> {
-        let cells = self.cells.iter().filter(|cell| (cell.variant, cell.criterion) == (variant, criterion));
-        let values: Vec<f64> = cells.filter_map(|cell| f1(&cell.counts)).collect();
-        (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
-    }
-
     /// Number of scenarios in which S fails a criterion with a model; 0 for a model that was not run.
     pub fn failing_scenarios(&self, model: ModelId, criterion: Criterion) -> u64 {
         self.index(0, model, criterion).and_then(|at| self.cells.get(at)).map_or(0, |cell| cell.failing_scenarios)

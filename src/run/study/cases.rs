@@ -50,11 +50,6 @@ impl StudyCases {
         &self.left_out
     }
 
-    /// Whether S' are given as series or cross-validated.
-    pub(super) fn has_others(&self) -> bool {
-        self.head.blocks.iter().any(|block| block.others().next().is_some())
-    }
-
     /// The units whose scenarios are held.
     pub(super) fn held_units(&self) -> Range<u64> {
         self.first_held..self.first_held + self.held.len() as u64

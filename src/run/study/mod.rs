@@ -5,7 +5,6 @@ mod cases;
 mod evaluation;
 mod external_replays;
 mod folds;
-mod motion_error;
 mod plan;
 pub(crate) mod plan_file;
 mod provenance;
@@ -149,7 +148,7 @@ impl StudyBuilder<'_> {
             reference: self.reference,
             incomplete: !collection.problems.is_empty(),
             scenario_file_sha256: self.scenario_file_sha256,
-            categories: category_provenance(collection, &cases)?,
+            categories: category_provenance(collection, &cases),
             left_out: collection.problems.iter().chain(cases.left_out()).map(Error::to_string).collect(),
             notes: collection.notes.clone(),
             recordings: collection.recordings.clone(),

@@ -3,12 +3,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::cases::{StudyCases, WINDOW};
-use super::motion_error::{MotionError, MotionSpread};
+use super::cases::StudyCases;
 use crate::score::ScoreOptions;
 use lanesweep_engine::Block;
 use lanesweep_model::scenario::parameterization::{ParameterizationOptions, Reduction};
-use lanesweep_support::Result;
 use lanesweep_traffic::mining::{Collection, MiningOptions, RecordingSummary, count};
 
 /// One category's scenarios.
@@ -24,10 +22,6 @@ pub struct CategoryProvenance {
     /// Id and fold of each kept scenario, with cross-validation.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub folds: Vec<(String, usize)>,
-    /// Error of the motions of each variant, in standard deviations of the recorded series, S first; only with S' that
-    /// are given as series or cross-validated.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub rmse: Vec<f64>,
 }
 
 /// Data of a report in addition to the lanes' outcomes.
@@ -63,51 +57,15 @@ pub struct StudyProvenance {
 }
 
 /// The data of every block of the plan.
-pub(super) fn category_provenance(collection: &Collection, planned: &StudyCases) -> Result<Vec<CategoryProvenance>> {
-    let rmse = motion_errors(planned)?;
-    let facts = |(at, (block, reduction)): (usize, (&Block, &Option<Reduction>))| {
+pub(super) fn category_provenance(collection: &Collection, planned: &StudyCases) -> Vec<CategoryProvenance> {
+    let facts = |(block, reduction): (&Block, &Option<Reduction>)| {
         let of = count(&collection.scenarios, block.category);
         let reduction = reduction.as_ref();
         let svd_explained = reduction.map_or(Vec::new(), |r| r.basis.explained().into_iter().take(8).collect());
         let units = block.first_unit..block.first_unit + block.units.len();
         let held = units.filter_map(|unit| planned.scenario(unit));
         let folds = held.filter_map(|scenario| Some((scenario.id.clone(), scenario.fold?))).collect();
-        CategoryProvenance {
-            found: of.found,
-            kept: of.kept,
-            svd_explained,
-            folds,
-            rmse: rmse.get(at).cloned().unwrap_or_default(),
-        }
+        CategoryProvenance { found: of.found, kept: of.kept, svd_explained, folds }
     };
-    Ok(planned.outline().blocks.iter().zip(&planned.reductions).enumerate().map(facts).collect())
-}
-
-/// Errors of every variant of every block; empty without S' that are given as series.
-fn motion_errors(planned: &StudyCases) -> Result<Vec<Vec<f64>>> {
-    let blocks = &planned.outline().blocks;
-    if !planned.has_others() {
-        return Ok(Vec::new());
-    }
-    let mut sums: Vec<(MotionSpread, Vec<MotionError>)> = blocks
-        .iter()
-        .map(|block| (MotionSpread::default(), vec![MotionError::default(); block.variants.len()]))
-        .collect();
-    planned.in_windows(0..planned.outline().unit_count(), WINDOW, |plan, units| {
-        for (at, inside) in plan.segments(units) {
-            let (spread, errors) = &mut sums[at];
-            for unit in inside {
-                let recorded = plan.case(at, unit, 0);
-                spread.add(&recorded, plan.tables());
-                for (variant, error) in errors.iter_mut().enumerate() {
-                    error.add((&recorded, plan.tables()), (&plan.case(at, unit, variant), plan.tables()));
-                }
-            }
-        }
-        Ok(())
-    })?;
-    let root = |(block, (spread, errors)): (&Block, (MotionSpread, Vec<MotionError>))| {
-        errors.iter().map(|error| error.root(block.category, &spread)).collect()
-    };
-    Ok(blocks.iter().zip(sums).map(root).collect())
+    planned.outline().blocks.iter().zip(&planned.reductions).map(facts).collect()
 }
