@@ -6,6 +6,7 @@ import csv
 import html
 import json
 import os
+import re
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -83,6 +84,10 @@ class Figure:
                 axis.set_yticks([-at for at in range(len(names))], names)
             axis.set(title=panel, xlabel=own[0]["x_quantity"], ylabel=own[0]["y_quantity"])
         axes.flat[0].legend(fontsize="small")
+        # What the figure says of itself, synthetic data first of all.
+        said = [re.search(f"<{tag}>(.*?)</{tag}>", self.svg, re.DOTALL) for tag in ("title", "desc")]
+        title, about = (html.unescape(found[1]) if found else "" for found in said)
+        figure.suptitle("\n".join(filter(None, [title, about.split(". ")[0], "SYNTHETIC DATA" * ("SYNTHETIC" in about)])), fontsize="medium")
         return figure
 
     def _repr_svg_(self) -> str:

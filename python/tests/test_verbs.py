@@ -116,6 +116,7 @@ def test_figures_are_drawn_with_matplotlib(scenarios, tmp_path) -> None:
     for name in result.figures:
         drawn = result.figure(name).plot()
         assert drawn.axes and all(axes.has_data() for axes in drawn.axes), name
+        assert "SYNTHETIC DATA" in drawn.get_suptitle()
         drawn.savefig(tmp_path / "figure.png")
         matplotlib.pyplot.close(drawn)
 

@@ -150,7 +150,12 @@ impl StudyReport<'_> {
             let least = least
                 .map_or("none approaches".to_owned(), |s| format!("their smallest TTC is {} s", significant(s, 2)));
             let cap_s = self.study.plan().profile.frame.time_cap_s;
-            text += &format!(" {} runs of S were undecided after {cap_s} s; {least}.", count(runs));
+            let all: u64 = scores.categories.iter().map(|of| of.simulations * of.models.len() as u64).sum();
+            text += &format!(
+                " {} of {} runs of S were undecided after {cap_s} s and count as passed; {least}.",
+                count(runs),
+                count(all)
+            );
         }
         text
     }
