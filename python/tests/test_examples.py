@@ -18,9 +18,9 @@ def test_an_autoencoder_goes_through_external_s_prime(scenarios: Path, tmp_path:
     command += ["--category", "lvd", "--size", "3", "--out", str(tmp_path)]
     subprocess.run(command, check=True, capture_output=True, cwd=tmp_path)
     with (tmp_path / "study" / "results.csv").open(encoding="utf-8") as lines:
-        scores = {row["variant"]: float(row["f1"]) for row in csv.DictReader(lines) if row["headway"] == "all" and row["f1"]}
-    assert {"iii", "iii-cv", "autoencoder-3"} <= scores.keys()
-    assert 0 < scores["autoencoder-3"] <= 1
+        scores = [(row["variant"], float(row["f1"])) for row in csv.DictReader(lines) if row["headway"] == "all" and row["f1"]]
+    assert {"iii", "iii-cv", "autoencoder-3"} <= dict(scores).keys()
+    assert max(f1 for variant, f1 in scores if variant == "autoencoder-3") > 0.5
 
 
 def test_tables_are_external_s_prime_by_their_names(scenarios: Path, tmp_path: Path) -> None:
