@@ -212,7 +212,7 @@ impl Doubts {
         }
     }
 
-    /// Notes a leader's acceleration: in many cases none of which brakes by more than 1.2 m/s², it may be in g.
+    /// Notes a leader's acceleration. If no leader of many brakes by more than 1.2 m/s², it may be in g.
     #[inline]
     pub fn note_leader(&mut self, acceleration_mps2: f64) {
         if acceleration_mps2 < 0.0 {
@@ -220,7 +220,7 @@ impl Doubts {
         }
     }
 
-    /// Notes whether a vehicle that cuts in is faster than the ego, which is no conflict: if all are, speeds may be exchanged.
+    /// Notes whether a vehicle that cuts in is faster than the ego. If all are, the two speeds may be exchanged.
     #[inline]
     pub fn note_cutter(&mut self, is_faster: bool) {
         self.cutters = [self.cutters[0] + 1, self.cutters[1] + u64::from(is_faster)];
@@ -256,7 +256,9 @@ impl Doubts {
         }
         if let (5.., largest @ ..=1.2) = self.leaders {
             let (count, largest) = (readable::count(self.leaders.0), readable::value(largest));
-            list.push(format!("no leader of {count} brakes by more than {largest} m/s²: check whether it is in g"));
+            list.push(format!(
+                "none of {count} leaders brakes by more than {largest} m/s²: check whether decelerations are in g"
+            ));
         }
         let [all, faster] = self.cutters;
         if all > 1 && faster == all {

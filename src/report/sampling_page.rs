@@ -61,8 +61,8 @@ impl SampleReport {
         let [p, low, high] = [p, low, high].map(|share| significant(100.0 * share, 2));
         let (model, criterion) = (row.model.name(), row.criterion.label());
         format!(
-            "Highest: {model} fails {criterion} at headway {} in {p} % [{low} {high}] of the scenarios. ",
-            row.headway
+            "Highest: {model} fails {criterion} in {p} % [{low} {high}] of the runs (THW {}). ",
+            self.headway_cell(row)
         )
     }
 

@@ -6,7 +6,7 @@ use super::study_figures::{short_name, variant_name};
 use super::tables::{reference_text, wrap};
 use lanesweep_engine::Headway;
 use lanesweep_model::scenario::Category;
-use lanesweep_run::score::Best;
+use lanesweep_run::score::{Best, BestScore};
 use lanesweep_support::readable::{count, count_of, counted, significant};
 use lanesweep_support::table::{NumberText, Table};
 
@@ -80,18 +80,16 @@ impl StudyReport<'_> {
     pub(super) fn sentence(&self) -> String {
         let best = &self.evaluation.best;
         let of_category = |of: &[Best]| {
-            let names: Vec<&str> =
-                of.iter().filter_map(|best| best.score.as_ref()).map(|score| score.variant.as_str()).collect();
-            let times = |name: &str| names.iter().filter(|other| **other == name).count();
+            let scores: Vec<&BestScore> = of.iter().filter_map(|best| best.score.as_ref()).collect();
+            let own = |best: &BestScore| scores.iter().filter(|score| score.variant == best.variant).count();
             // The first of equals.
-            let most = names.iter().rev().max_by_key(|name| times(name));
-            let answer = most.map_or("too few collisions to tell".to_owned(), |name| {
-                format!(
-                    "{} (best for {} of {})",
-                    variant_name(of[0].category, name),
-                    times(name),
-                    counted(of.len(), "driver")
-                )
+            let most = scores.iter().rev().max_by_key(|score| own(score));
+            let answer = most.map_or("too few collisions to tell".to_owned(), |best| {
+                let tied =
+                    scores.iter().filter(|score| score.variant == best.variant && !score.rivals.is_empty()).count();
+                let (times, drivers) = (own(best), counted(of.len(), "driver"));
+                let name = variant_name(of[0].category, &best.variant);
+                format!("{name} (best for {times} of {drivers}, tied with others for {tied})")
             });
             format!("{}: {answer}", of[0].category.label())
         };

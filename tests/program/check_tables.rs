@@ -187,6 +187,24 @@ fn notes(dir: &Path, table: &str) -> [String; 2] {
 }
 
 #[test]
+fn what_every_case_of_a_table_shares_may_be_a_mistake_and_is_told() {
+    let dir = tempfile::tempdir().unwrap();
+    let said = |header: &str, rows: &[&str]| {
+        file(dir.path(), "t.csv", &format!("{header}\n{}\n", rows.join("\n")));
+        said(dir.path(), "check t.csv --nominal --backend cpu").1
+    };
+    let cut_ins = "id,category,ego_speed_kmh,speed_kmh,gap,lateral_speed";
+    let (faster, slower) = (["a,cut-in,72,108,40,1", "b,cut-in,60,90,18,0.8"], "c,cut-in,108,72,20,1");
+    let told = "the vehicle that cuts in is faster than the ego in all 2 cases";
+    assert!(said(cut_ins, &faster).contains(told), "{}", said(cut_ins, &faster));
+    assert!(!said(cut_ins, &[faster[0], slower]).contains("is faster than the ego"));
+    let lvds = "id,category,ego_speed_kmh,thw_s,acceleration_mps2";
+    let in_g = ["a,lvd,60,1,-0.5", "b,lvd,70,1,-0.4", "c,lvd,80,1,-0.6", "d,lvd,90,1,-0.5", "e,lvd,100,1,-0.3"];
+    assert!(said(lvds, &in_g).contains("none of 5 leaders brakes by more than 0.6 m/s²"), "{}", said(lvds, &in_g));
+    assert!(!said(lvds, &[&in_g[..4], &["e,lvd,100,1,-5"]].concat()).contains("leaders brakes"));
+}
+
+#[test]
 fn every_verb_doubts_the_same_values_of_a_table_and_names_their_place() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();

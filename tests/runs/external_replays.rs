@@ -106,6 +106,19 @@ fn s_prime_of_other_programs_and_of_bases_of_other_folds_are_scored() {
     std::fs::write(of("slower.jsonl"), slower.collect::<String>()).unwrap();
     let text = said(dir.path(), &format!("{} slower.jsonl --categories cut-in --out ids", &study[3..])).1;
     assert!(text.contains("begin with another speed of the ego"), "{text}");
+    // S itself in lane widths, and lane changes to the marking.
+    let narrow = cut_ins.iter().cloned().map(|mut row| {
+        let y: Vec<f64> = row["target"]["y"].as_array().unwrap().iter().map(|y| y.as_f64().unwrap() / 3.5).collect();
+        row["target"]["y"] = y.into();
+        format!("{row}\n")
+    });
+    std::fs::write(of("narrow.jsonl"), narrow.collect::<String>()).unwrap();
+    let text = said(dir.path(), "study --scenarios narrow.jsonl --out ids").1;
+    assert!(text.contains("are in the ego's lane throughout, the first is"), "{text}");
+    let whole = "study --scenarios scenarios.jsonl --categories cut-in --out ids";
+    let text = said(dir.path(), &format!("{whole} --config parameterization.lane_change_m=1.75")).1;
+    assert!(text.contains("a lane change moves from middle to middle"), "{text}");
+    assert!(!said(dir.path(), whole).1.contains(" WARN"));
     // What is wrong is said.
     let scenarios = read_scenario_file(&of("scenarios.jsonl"), Implausible::Refused).unwrap().scenarios;
     let id = &scenarios.iter().find(|s| s.kept && s.category == Category::CutIn).unwrap().id;
