@@ -188,7 +188,7 @@ impl SampleReport {
             text.push_str("Rare failures, by importance sampling:\n");
             text.push_str(&self.table(|row| row.is_rare_beside(&self.estimates)).text());
         }
-        let notes: Vec<String> = self.notes();
+        let notes = self.notes();
         for note in notes.iter().take(MAX_NOTES) {
             text += &paragraph(note);
         }

@@ -6,7 +6,7 @@ use super::study_figures::{short_name, variant_name};
 use super::tables::{reference_text, wrap};
 use lanesweep_engine::Headway;
 use lanesweep_model::scenario::Category;
-use lanesweep_run::score::{Best, BestScore};
+use lanesweep_run::score::{Best, BestScore, CategoryScores};
 use lanesweep_support::readable::{count, count_of, counted, significant};
 use lanesweep_support::table::{NumberText, Table};
 
@@ -28,8 +28,9 @@ const NUMBERS: [usize; 2] = [4, 6];
 const LEGEND: &str = "Missed: collisions of S that the best does not show. Ties: F1 within chance of the best's; 2.0x: \
                       twice the scenarios would tell, if F1 stays.";
 
-fn table(rows: &[[String; 7]]) -> Table {
-    let words = Table::of(rows).columns(0..4, |at| HEADER[at], |row, at| row[at].as_str());
+/// The rows, with the columns of words in an order.
+fn table(rows: &[[String; 7]], words: [usize; 4]) -> Table {
+    let words = Table::of(rows).columns(words, |at| HEADER[at], |row, at| row[at].as_str());
     words.columns(4..7, |at| HEADER[at], |row, at| NumberText(row[at].clone())).build()
 }
 
@@ -68,12 +69,10 @@ impl StudyReport<'_> {
             row
         };
         // On a narrow screen a name would push the number out.
-        const ORDER: [usize; 7] = [0, 1, 3, 2, 4, 5, 6];
+        let table = |rows: &[[String; 7]]| table(rows, [0, 1, SCORE, 2]);
         let rows: Vec<[String; 7]> = self.evaluation.best.iter().map(named).collect();
         let intro = format!("{}. {LEGEND} {}", self.size(), self.conditions());
-        let words = Table::of(&rows).columns(0..4, |at| HEADER[ORDER[at]], |row, at| row[ORDER[at]].as_str());
-        let table = words.columns(4..7, |at| HEADER[at], |row, at| NumberText(row[at].clone())).build();
-        Section::new("answer", "").intro(intro).tables([table.captioned(self.question())])
+        Section::new("answer", "").intro(intro).tables([table(&rows).captioned(self.question())])
     }
 
     /// The answer in a sentence: by category the parameterization that is best for most drivers.
@@ -116,12 +115,8 @@ impl StudyReport<'_> {
     fn question(&self) -> String {
         let scores = &self.evaluation.scores;
         let level = 100.0 * scores.options.confidence;
-        let (is_fitted, is_held_out) = scores.categories.iter().fold((false, false), |(fitted, held_out), of| {
-            let is_fitted =
-                of.judged().iter().any(|at| variant_name(of.category, &of.variants[*at]).ends_with("in sample"));
-            (fitted || is_fitted, held_out || of.is_cross_validated())
-        });
-        let judged = match (is_fitted, is_held_out) {
+        let has = |is: fn(&CategoryScores) -> bool| scores.categories.iter().any(is);
+        let judged = match (has(CategoryScores::is_in_sample), has(CategoryScores::is_cross_validated)) {
             (true, _) => " (SVD in sample)",
             (_, true) => " on scenarios that no fit has seen",
             _ => "",
@@ -207,7 +202,7 @@ impl StudyReport<'_> {
             lines.extend(of.iter().map(|best| line(&self.row(best))));
         }
         if lines.iter().flat_map(|text| text.lines()).any(|line| line.chars().count() > screen) {
-            lines = table(&known).fitted(2, screen).lines().map(str::to_owned).collect();
+            lines = table(&known, [0, 1, 2, SCORE]).fitted(2, screen).lines().map(str::to_owned).collect();
         }
         let more = self.evaluation.best.len().saturating_sub(MAX_ROWS);
         if more > 0 {

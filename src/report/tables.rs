@@ -139,6 +139,18 @@ struct ResultRow<'a> {
     capped: Option<u64>,
 }
 
+impl<'a> ResultRow<'a> {
+    /// The scores, which compare S' with S over all headways.
+    fn score(self) -> Option<&'a ScoreCell> {
+        (self.cell.variant > 0 && self.headway.is_none()).then_some(self.cell)
+    }
+
+    /// `None` for S and S' of other programs.
+    fn parameterization(self) -> Option<Parameterization> {
+        Parameterization::find(self.scores.category, short_name(&self.scores.variants[self.cell.variant]))
+    }
+}
+
 /// Everything that a study counts and scores: a row per category, variant, driver model, criterion and headway, and one over
 /// all headways. `data` describes the data.
 ///
@@ -168,18 +180,16 @@ pub(super) fn result_records(evaluation: &StudyEvaluation, data: &str) -> Result
             }));
         }
     }
-    // Scores need S and S' of one run, whose pairs are counted over all headways.
-    let score = |row: ResultRow<'_>| (row.cell.variant > 0 && row.headway.is_none()).then_some(row.cell.clone());
-    let counts = |row: ResultRow<'_>| score(row).map(|cell| cell.counts);
-    let interval = |row: ResultRow<'_>| score(row).and_then(|cell| cell.f1_interval);
+    let counts = |row: ResultRow<'_>| row.score().map(|cell| cell.counts);
+    let interval = |row: ResultRow<'_>| row.score().and_then(|cell| cell.f1_interval);
     Ok(Table::of(rows)
         .column("category", |row| row.scores.category.key())
         .column("variant", |row| row.scores.variants[row.cell.variant].as_str())
         .column("model", |row| row.cell.model.name())
         .column("criterion", |row| row.cell.criterion.key())
         .column("headway", |row| row.headway.map_or("all".to_owned(), |headway| headway.to_string()))
-        .column("parameters", |row| known(row).map(|found| found.parameter_count()))
-        .column("fit", |row| match known(row).and_then(|found| found.coefficients()) {
+        .column("parameters", |row| row.parameterization().map(|found| found.parameter_count()))
+        .column("fit", |row| match row.parameterization().and_then(|found| found.coefficients()) {
             Some(_) if row.scores.variants[row.cell.variant].ends_with(CROSS_VALIDATED) => "cross-validated",
             Some(_) => "in sample",
             None => "",
@@ -196,15 +206,10 @@ pub(super) fn result_records(evaluation: &StudyEvaluation, data: &str) -> Result
         .column("f1", |row| counts(row).and_then(|of| f1(&of)))
         .column("f1_low", |row| interval(row).map(|of| of.low))
         .column("f1_high", |row| interval(row).map(|of| of.high))
-        .column("f1_no_interval", |row| score(row).map_or("", |cell| no_interval(&cell)))
+        .column("f1_no_interval", |row| row.score().map_or("", no_interval))
         .column("failing_scenarios", |row| row.headway.is_none().then_some(row.cell.failing_scenarios))
         .column("data", |_| data)
         .build())
-}
-
-/// The parameterization of a row; `None` for S and those of other programs.
-fn known(row: ResultRow) -> Option<Parameterization> {
-    Parameterization::find(row.scores.category, short_name(&row.scores.variants[row.cell.variant]))
 }
 
 /// Why F1 has no interval; empty if it has one.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::common::golden;
-use crate::common::program::command;
+use crate::common::program::{command, json, table};
 
 fn assert_fits(text: &str, width: usize) {
     for line in text.lines() {
@@ -19,6 +19,45 @@ fn study(dir: &Path, columns: &str, args: &[&str]) -> (String, String) {
     let [out, err] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
     assert!(output.status.success(), "{err}");
     (out, err)
+}
+
+/// The record says what the rows say, which are binary32.
+#[test]
+fn undecided_runs_and_fits_in_sample_are_those_of_the_rows() {
+    let dir = tempfile::tempdir().unwrap();
+    let flags = ["--rows", "rows.csv", "--out", "out", "--config", "study.folds=1", "--figures", "plain"];
+    let (out, _) = study(dir.path(), "80", &[&["--synth-recordings", "4"][..], &flags].concat());
+    assert!(out.contains("F1 [95 %] (SVD in sample):") && !out.contains("no fit has seen"), "{out}");
+    let results = table(&dir.path().join("out/results.csv"));
+    assert!(
+        results.iter().any(|row| row["fit"] == "in sample")
+            && results.iter().all(|row| row["fit"] != "cross-validated")
+    );
+    let rows = table(&dir.path().join("rows.csv"));
+    let (record, mut checked) = (json(&dir.path().join("out/run.json")), 0);
+    for category in record["categories"].as_array().unwrap() {
+        for capped in category["capped_s"].as_array().unwrap() {
+            let is_own = |row: &&std::collections::BTreeMap<String, String>| {
+                let of = [("category", &category["category"]), ("model", &capped["model"])];
+                row["variant"] == "S"
+                    && row["capped"] == "1"
+                    && of.iter().all(|(key, value)| row[*key] == value.as_str().unwrap())
+            };
+            let own: Vec<f64> = rows.iter().filter(is_own).map(|row| row["min_ttc_s"].parse().unwrap()).collect();
+            let least = own.iter().copied().fold(f64::INFINITY, f64::min);
+            assert_eq!(capped["runs"], own.len(), "{capped}");
+            let found = capped["min_ttc_s"].as_f64().unwrap_or(f64::INFINITY);
+            assert!(found == least || (found / least - 1.0).abs() < 1e-3, "{capped}: {least}");
+            checked += 1;
+        }
+    }
+    assert!(checked > 2, "{record}");
+    // A plain figure has its texts beside it, and says itself what the data are.
+    let read = |name: &str| std::fs::read_to_string(dir.path().join("out/figures").join(name)).unwrap();
+    let (svg, text) = (read("f1-cut-in.svg"), read("f1-cut-in.txt"));
+    assert!(svg.contains("width=\"88mm\"") && !svg.contains(">cut-in: F1 of parameterized against recorded</text>"));
+    let description = svg.split("<desc>").nth(1).unwrap().split("</desc>").next().unwrap();
+    assert!(description.contains("SYNTHETIC DATA") && text.contains("SYNTHETIC DATA"), "{description} {text}");
 }
 
 const GENERATED: [&str; 4] = ["--synth-recordings", "2", "--config", "generator.duration_s=120"];

@@ -200,7 +200,13 @@ impl Figure {
             texts.push(self.notes.0.to_owned());
             texts.extend(self.notes.1.iter().cloned());
         }
-        (bare.drawn(|_, y| y).in_mm(width_mm).document(&self.title, &self.caption), texts.join("\n") + "\n")
+        let svg = bare.drawn(|_, y| y).in_mm(width_mm).document(&self.title, &self.description());
+        (svg, texts.join("\n") + "\n")
+    }
+
+    /// What a screen reader says: the data, and what the marks are.
+    fn description(&self) -> String {
+        [self.subtitle.as_deref().unwrap_or_default(), &self.caption].join(" ").trim().to_owned()
     }
 
     fn has_few(&self) -> bool {
@@ -209,8 +215,7 @@ impl Figure {
 
     /// The same with what `between` draws below the heading, from a y to the y that it returns.
     pub(super) fn svg_with(&self, between: impl FnOnce(&mut Canvas, f64) -> f64) -> String {
-        let description = [self.subtitle.as_deref().unwrap_or_default(), &self.caption].join(" ");
-        self.drawn(between).document(&self.title, description.trim())
+        self.drawn(between).document(&self.title, &self.description())
     }
 
     fn drawn(&self, between: impl FnOnce(&mut Canvas, f64) -> f64) -> Canvas {

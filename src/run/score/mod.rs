@@ -29,6 +29,7 @@ use lanesweep_engine::{Confusion, Headway, LanePlan, Partial, UnitCounts};
 use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::scenario::Category;
+use lanesweep_model::scenario::parameterization::Parameterization;
 use lanesweep_support::{Error, Place, Result, ranges, settings};
 
 /// Ending of the name of a parameterization that replays each scenario by a basis that has not seen it.
@@ -135,6 +136,13 @@ impl CategoryScores {
     /// Whether decompositions are judged on scenarios that they have not seen.
     pub fn is_cross_validated(&self) -> bool {
         self.variants.iter().any(|variant| variant.ends_with(CROSS_VALIDATED))
+    }
+
+    /// Whether a decomposition is judged on the scenarios that it was fitted on.
+    pub fn is_in_sample(&self) -> bool {
+        let found =
+            self.judged().into_iter().filter_map(|at| Parameterization::find(self.category, &self.variants[at]));
+        found.map(|id| id.coefficients()).any(|coefficients| coefficients.is_some())
     }
 
     /// Index of a variant by its name.

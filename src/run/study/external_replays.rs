@@ -107,6 +107,7 @@ impl ExternalReplay {
             return Err(Error::input(Place::file(path), problem, "give all kept scenarios of a category, or none"));
         }
         let pairs: Vec<_> = scenarios.iter().filter_map(|s| Some((s, self.scenarios.get(&s.id)?))).collect();
+        let (file, category) = (path.display(), self.category.label());
         // Left-out samples shorten every S' by one factor.
         let mut times: Vec<f64> = pairs.iter().map(|(s, own)| own.duration_s / s.duration_s()).collect();
         times.sort_by(f64::total_cmp);
@@ -114,11 +115,9 @@ impl ExternalReplay {
             && !(0.8..=1.25).contains(&least)
             && most < 1.1 * least
         {
-            let (file, times, category) = (path.display(), readable::value(least), self.category.label());
+            let times = readable::value(least);
             tracing::warn!("{file}: every S' ({category}) lasts {times} times as long as its scenario: check `fps`");
         }
-        let file = path.display();
-        let category = self.category.label();
         let mut shorter_s: Vec<f64> = pairs.iter().map(|(s, own)| s.duration_s() - own.duration_s).collect();
         shorter_s.sort_by(f64::total_cmp);
         let by_s = shorter_s.get(shorter_s.len() / 2).copied().unwrap_or(0.0);
@@ -134,15 +133,20 @@ impl ExternalReplay {
         if pairs.iter().all(is_same) {
             tracing::warn!("{file}: every S' ({category}) has the series of its scenario: it is S itself");
         }
+        type Of<'a> = &'a dyn Fn(&Scenario, &ReducedScenario) -> f64;
+        let sum = |of: Of| pairs.iter().map(|(s, own)| of(s, own)).sum::<f64>();
         let widest = |y: &[f64]| y.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
-        let reach =
-            |of: &dyn Fn(&Scenario, &ReducedScenario) -> f64| pairs.iter().map(|(s, own)| of(s, own)).sum::<f64>();
-        let times = reach(&|_, own| widest(&own.y)) / reach(&|s, _| widest(&s.target.y));
+        let times = sum(&|_, own| widest(&own.y)) / sum(&|s, _| widest(&s.target.y));
         if self.category != Category::Lvd && !(0.7..=1.4).contains(&times) {
             let times = readable::value(times);
             tracing::warn!(
                 "{file}: S' ({category}) move {times} times as far to the side as their scenarios: check the unit of y"
             );
+        }
+        let times = sum(&|_, own| own.lead_gap_m) / sum(&|s, _| s.lead_gap.unwrap_or(0.0));
+        if self.category == Category::CutOut && !(0.8..=1.25).contains(&times) {
+            let times = readable::value(times);
+            tracing::warn!("{file}: `D` is {times} times that of the scenarios on average: check its unit and meaning");
         }
         let first = |of: &[f64]| of.first().copied().unwrap_or(0.0);
         // What no parameterization changes.
@@ -161,16 +165,8 @@ impl ExternalReplay {
         for (what, differs) in differences {
             let others = pairs.iter().filter(|(s, own)| differs(s, own)).count();
             if 2 * others > pairs.len() {
-                let (file, of, category) = (path.display(), pairs.len(), self.category.label());
-                tracing::warn!("{file}: {others} of {of} S' ({category}) {what}");
+                tracing::warn!("{file}: {others} of {} S' ({category}) {what}", pairs.len());
             }
-        }
-        let sum =
-            |of: &dyn Fn(&Scenario, &ReducedScenario) -> f64| pairs.iter().map(|(s, own)| of(s, own)).sum::<f64>();
-        let times = sum(&|_, own| own.lead_gap_m) / sum(&|s, _| s.lead_gap.unwrap_or(0.0));
-        if self.category == Category::CutOut && !(0.8..=1.25).contains(&times) {
-            let (file, times) = (path.display(), readable::value(times));
-            tracing::warn!("{file}: `D` is {times} times that of the scenarios on average: check its unit and meaning");
         }
         // Rows that were shifted or sorted have the ids of other scenarios.
         let difference = |(s, own): (&Scenario, &ReducedScenario)| {
@@ -182,11 +178,9 @@ impl ExternalReplay {
         let near = pairs.iter().copied().zip(next).filter(is_nearer).count();
         if pairs.len() >= 4 && 4 * near < 3 * pairs.len() {
             tracing::warn!(
-                "{}: the first and last speeds of only {near} of {} S' ({}) are nearer to their own scenario than to the \
-                 next one: check the ids",
-                path.display(),
-                pairs.len(),
-                self.category.label()
+                "{file}: the first and last speeds of only {near} of {} S' ({category}) are nearer to their own scenario than \
+                 to the next one: check the ids",
+                pairs.len()
             );
         }
         Ok(())

@@ -32,8 +32,6 @@ const MIN_RASTER_M: f64 = 0.2;
 const MAX_RASTER: f64 = 0.25;
 /// Widths of the lanes of motorways, m.
 const USUAL_LANES_M: std::ops::RangeInclusive<f64> = 2.7..=4.6;
-/// Length and width that the median car exceeds, m.
-const SMALL_CAR_M: (f64, f64) = (3.3, 1.4);
 /// Fewer vehicles prove nothing.
 pub(super) const MIN_VEHICLES: usize = 5;
 
@@ -216,27 +214,7 @@ impl Understanding {
                 self.refuse(format!("the median vehicle: {}", quantity.describe(middle)));
             }
         }
-        let sizes =
-            recording.tracks.iter().filter(|of| of.class == VehicleClass::Car).map(|of| (of.length_m, of.width_m));
-        let (mut lengths, mut widths): (Vec<f64>, Vec<f64>) = sizes.unzip();
-        let (long_m, wide_m) = (median(&mut lengths), median(&mut widths));
-        if lengths.len() >= MIN_VEHICLES && long_m < SMALL_CAR_M.0 && wide_m < SMALL_CAR_M.1 {
-            let (long_m, wide_m) = (significant(long_m, 3), significant(wide_m, 2));
-            self.warn(format!("cars are {long_m} m long and {wide_m} m wide (medians): are these half extents?"));
-        }
-        let mut lengths: Vec<f64> =
-            recording.tracks.iter().filter(|of| of.class == VehicleClass::Truck).map(|of| of.length_m).collect();
-        lengths.sort_by(f64::total_cmp);
-        let longest_m = lengths.last().copied().unwrap_or(0.0);
-        let others = lengths.iter().filter(|length_m| **length_m < longest_m).count();
-        let distinct = lengths.chunk_by(|a, b| a == b).count();
-        // Simulated lorries have a few lengths, measured ones many, of which the largest is one's alone.
-        if lengths.len() - others > others.max(MIN_VEHICLES) && distinct > 2 {
-            self.warn(format!(
-                "most lorries are {} m long, and none is longer: were lengths cut off there?",
-                significant(longest_m, 3)
-            ));
-        }
+        self.check_sizes(recording);
         let length_of = |class: VehicleClass| {
             let mut lengths: Vec<f64> =
                 recording.tracks.iter().filter(|of| of.class == class).map(|of| of.length_m).collect();

@@ -1,4 +1,4 @@
-//! Where boxes are: on each other, beside the middle of their lane, beside the lane lines of the file.
+//! Boxes: their sizes, and where they are: on each other, beside the middle of their lane, beside the lane lines of the file.
 
 use std::collections::HashSet;
 
@@ -17,8 +17,35 @@ const MAX_OVERLAPPING: f64 = 0.1;
 const MIN_EDGE: f64 = 0.6;
 /// Distance of a lane line from the middle between the vehicles of its lanes from which on it is not where they see it, m.
 const MAX_LINE_OFF_M: f64 = 0.45;
+/// Length and width that the median car exceeds, m.
+const SMALL_CAR_M: (f64, f64) = (3.3, 1.4);
 
 impl Understanding {
+    /// Finds half extents, and lengths that end at one value.
+    pub(super) fn check_sizes(&mut self, recording: &Recording) {
+        let sizes =
+            recording.tracks.iter().filter(|of| of.class == VehicleClass::Car).map(|of| (of.length_m, of.width_m));
+        let (mut lengths, mut widths): (Vec<f64>, Vec<f64>) = sizes.unzip();
+        let (long_m, wide_m) = (median(&mut lengths), median(&mut widths));
+        if lengths.len() >= MIN_VEHICLES && long_m < SMALL_CAR_M.0 && wide_m < SMALL_CAR_M.1 {
+            let (long_m, wide_m) = (significant(long_m, 3), significant(wide_m, 2));
+            self.warn(format!("cars are {long_m} m long and {wide_m} m wide (medians): are these half extents?"));
+        }
+        let mut lengths: Vec<f64> =
+            recording.tracks.iter().filter(|of| of.class == VehicleClass::Truck).map(|of| of.length_m).collect();
+        lengths.sort_by(f64::total_cmp);
+        let longest_m = lengths.last().copied().unwrap_or(0.0);
+        let others = lengths.iter().filter(|length_m| **length_m < longest_m).count();
+        let distinct = lengths.chunk_by(|a, b| a == b).count();
+        // Simulated lorries have a few lengths, measured ones many, of which the largest is one's alone.
+        if lengths.len() - others > others.max(MIN_VEHICLES) && distinct > 2 {
+            self.warn(format!(
+                "most lorries are {} m long, and none is longer: were lengths cut off there?",
+                significant(longest_m, 3)
+            ));
+        }
+    }
+
     /// Finds boxes that overlap or are beside the middle of their lanes, and small jumps.
     pub(super) fn check_boxes(&mut self, recording: &Recording) {
         let found = overlaps(recording);
