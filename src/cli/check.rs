@@ -19,6 +19,7 @@ use lanesweep_report::case_sheet::CaseSheet;
 use lanesweep_run::check::{Check as Checked, Subject, retain_applicable};
 use lanesweep_support::files::{check_output, write_atomically};
 use lanesweep_support::input_file::{self, plain_name};
+use lanesweep_support::plain_text::shown_in_line;
 use lanesweep_support::table::TableFormat;
 use lanesweep_support::{Error, Place, Result, option};
 
@@ -194,7 +195,9 @@ impl Check {
             ("toml", None) if self.row.is_none() => return self.of_flags(from_toml(path)?, profile, origin),
             ("csv" | "parquet", None) => {
                 let row = self.row.unwrap_or(1);
-                return self.of_flags(from_table(path, Some(row))?, profile, format!("{origin}, row {row}"));
+                let case = from_table(path, Some(row))?;
+                let id = case.id.as_ref().map_or(String::new(), |id| format!(", id {}", shown_in_line(id)));
+                return self.of_flags(case, profile, format!("{origin}, row {row}{id}"));
             }
             ("jsonl" | "csv" | "parquet", Some(id)) => {
                 let (scenarios, incomplete) = scenarios_of(path, self.plausibility.policy())?;

@@ -8,7 +8,7 @@ use std::io::{self, IsTerminal, Write};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use clap::error::ContextValue;
+use clap::error::{ContextValue, ErrorKind};
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle, WeakProgressBar};
 use tracing::{Level, Metadata};
 use tracing_subscriber::fmt::MakeWriter;
@@ -18,7 +18,7 @@ use super::Exit;
 use lanesweep_report::tables::WIDTH;
 use lanesweep_support::plain_text::{cut, cut_names, quoted_word, shown, shown_in_line, shown_json};
 use lanesweep_support::readable::count;
-use lanesweep_support::{Error, Result};
+use lanesweep_support::{Error, Place, Result};
 
 /// Name of standard output in errors.
 const STDOUT: &str = "standard output";
@@ -300,8 +300,17 @@ pub(super) fn refuse(error: &clap::Error) -> Result<Exit> {
             safe = safe.replace(&*shown(value), &short);
         }
     }
-    // Ignore a closed stderr: no message can be shown.
-    let _ = if safe == text { error.print() } else { write!(io::stderr().lock(), "{safe}") };
+    if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+        say(&safe);
+        return Ok(Exit::Usage);
+    }
+    // Clap's paragraphs: what is wrong, tips, the usage, where the help is.
+    let one_line = |part: &str| part.split_whitespace().collect::<Vec<_>>().join(" ");
+    let parts: Vec<String> = safe.split("\n\n").map(one_line).collect();
+    let after = |words: &'static str| parts.iter().filter_map(move |part| part.strip_prefix(words));
+    let help: Vec<&str> = after("tip: ").chain(after("Usage: ")).chain(after("For more information, ")).collect();
+    let problem = after("error: ").next().unwrap_or(&safe);
+    complain(&Error::usage(Place::item("lanesweep"), problem, help.join("\n")));
     Ok(Exit::Usage)
 }
 

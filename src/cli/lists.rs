@@ -10,6 +10,7 @@ use lanesweep_model::plausibility::Quantity;
 use lanesweep_model::scenario::Category;
 use lanesweep_model::scenario::Driven;
 use lanesweep_model::scenario::parameterization::Parameterization;
+use lanesweep_support::plain_text::nearest;
 use lanesweep_support::ranges::refuse_repeats;
 use lanesweep_support::{Error, Place, Result, option};
 
@@ -149,10 +150,8 @@ impl CriterionFlag {
     /// # Errors
     /// [`Error::Usage`] for an unknown criterion.
     pub(super) fn get(&self) -> Result<Criterion> {
-        Criterion::parse(self.criterion.trim()).ok_or_else(|| {
-            let problem = format!("there is no criterion `{}`", self.criterion);
-            Error::usage(Place::option("criterion"), problem, "use collision, ttc or btn")
-        })
+        let (text, names) = (self.criterion.trim(), Criterion::ALL.map(Criterion::key));
+        Criterion::parse(text).ok_or_else(|| Error::unknown(Place::option("criterion"), "criterion", text, names, ""))
     }
 }
 
@@ -190,9 +189,8 @@ pub(super) fn models<'a>(list: impl IntoIterator<Item = &'a str>, option: &'stat
             Some(model) => named.push((model, text)),
             None if text == "all" => named.extend(ModelId::ALL.map(|model| (model, text))),
             None => {
-                let problem = format!("there is no driver model `{text}`");
-                let help = format!("use one of {}, or all", ModelId::names());
-                return Err(Error::usage(Place::option(option), problem, help));
+                let names = ModelId::ALL.map(ModelId::name);
+                return Err(Error::unknown(Place::option(option), "driver model", text, names, ", all"));
             }
         }
     }
@@ -215,8 +213,10 @@ pub(super) fn headways(list: &[String]) -> Result<Vec<Headway>> {
         }
         value.map(Headway::thw).ok_or_else(|| {
             let problem = format!("`{text}` is not a time headway");
+            let near = nearest(text, ["r157", "paper", "observed"], 0.6);
+            let near = near.map_or(String::new(), |near| format!("did you mean `{near}`? "));
             let help = "give seconds above 0 with commas, `r157`, `paper` or `observed`";
-            Error::usage(Place::option("thw"), problem, help)
+            Error::usage(Place::option("thw"), problem, near + help)
         })
     };
     if list.iter().any(|text| Headway::parse(text.trim()) == Some(Headway::Observed)) {

@@ -132,10 +132,8 @@ impl Map {
     /// Builds the grids from flags and settings.
     fn grids(&self, category: Category, settings: &MapSettings, profile: &Profile) -> Result<MapGrids> {
         if let Some(name) = &self.preset {
-            let unknown = || {
-                let help = format!("presets: {}", Presets::ALL.map(Presets::name).join(", "));
-                Error::usage(Place::option("preset"), format!("there is no preset `{name}`"), help)
-            };
+            let names = Presets::ALL.map(Presets::name);
+            let unknown = || Error::unknown(Place::option("preset"), "preset", name, names, "");
             return Ok(MapGrids::Preset(Presets::find(name).ok_or_else(unknown)?, category));
         }
         let (x, y, panel, set) = (self.x.clone(), self.y.clone(), self.panel.clone(), self.set.clone());

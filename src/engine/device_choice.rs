@@ -80,11 +80,10 @@ impl FromStr for BackendChoice {
             "auto" => Ok(BackendChoice::Auto),
             "cpu" => Ok(BackendChoice::Cpu),
             "gpu" => Ok(BackendChoice::Gpu),
-            _ => Err(Error::usage(
-                Place::option("backend"),
-                format!("there is no backend `{text}`"),
-                format!("write auto, cpu or gpu; a certain device: {}, see `lanesweep devices`", option("device")),
-            )),
+            _ => {
+                let or = format!("; a certain device: {}, see `lanesweep devices`", option("device"));
+                Err(Error::unknown(Place::option("backend"), "backend", text, ["auto", "cpu", "gpu"], &or))
+            }
         }
     }
 }

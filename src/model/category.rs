@@ -50,7 +50,7 @@ impl Category {
     /// # Errors
     /// [`Error::Usage`] for an unknown name.
     pub fn named(text: &str, place: Place) -> Result<Category> {
-        let unknown = || Error::usage(place, format!("there is no category `{text}`"), "use cut-in, cut-out or lvd");
-        Category::parse(text).ok_or_else(unknown)
+        let names = Category::ALL.map(Category::label);
+        Category::parse(text).ok_or_else(|| Error::unknown(place, "category", text, names, ""))
     }
 }

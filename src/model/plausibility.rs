@@ -76,6 +76,9 @@ pub const LIMITS: [Limits; 11] = [
 /// An initial distance up to which every headway is plausible, m: a slow ego is many seconds behind a vehicle that is near.
 pub const NEAR_M: f64 = 100.0;
 
+/// Length and width of which a usual car exceeds one, m.
+const SMALL_CAR_M: (f64, f64) = (3.3, 1.4);
+
 /// Speeds between this value and 0 are noise of a standing vehicle, m/s.
 pub const NOISE_MPS: f64 = -0.5;
 
@@ -162,6 +165,8 @@ pub struct Doubts {
     still: Finding,
     /// Leaders that brake, and their largest deceleration, m/s².
     leaders: (u64, f64),
+    /// Vehicles, and those of them that are smaller than the smallest usual car.
+    boxes: [u64; 2],
     /// Vehicles that cut in, and those of them that are faster than the ego.
     cutters: [u64; 2],
 }
@@ -201,9 +206,11 @@ impl Doubts {
         self.found[quantity as usize].add(Finding { count: 1, first: text });
     }
 
-    /// Checks that a vehicle is at least as long as wide; `place` returns the place of its length.
+    /// Checks that a vehicle is at least as long as wide, and notes whether it is as large as a car; `place` returns the place of its length.
     #[inline]
     pub fn check_shape(&mut self, length_m: f64, width_m: f64, place: impl FnOnce() -> String) {
+        let is_small = length_m < SMALL_CAR_M.0 && width_m < SMALL_CAR_M.1;
+        self.boxes = [self.boxes[0] + 1, self.boxes[1] + u64::from(is_small)];
         // An implausible length or width has its own sentence, but for exchanged ones.
         let fits = |length, width| Quantity::Length.is_plausible(length) && Quantity::Width.is_plausible(width);
         if length_m < width_m && (fits(length_m, width_m) || fits(width_m, length_m)) {
@@ -240,7 +247,8 @@ impl Doubts {
     pub fn add(&mut self, other: Doubts) {
         self.still.add(other.still);
         self.leaders = (self.leaders.0 + other.leaders.0, self.leaders.1.max(other.leaders.1));
-        self.cutters.iter_mut().zip(other.cutters).for_each(|(own, theirs)| *own += theirs);
+        let counts = self.boxes.iter_mut().chain(&mut self.cutters);
+        counts.zip(other.boxes.into_iter().chain(other.cutters)).for_each(|(own, theirs)| *own += theirs);
         for (own, theirs) in self.found.iter_mut().zip(other.found) {
             own.add(theirs);
         }
@@ -258,6 +266,13 @@ impl Doubts {
             let (count, largest) = (readable::count(self.leaders.0), readable::value(largest));
             list.push(format!(
                 "none of {count} leaders brakes by more than {largest} m/s²: check whether decelerations are in g"
+            ));
+        }
+        let [all, small] = self.boxes;
+        if all > 4 && 2 * small >= all {
+            let ((long_m, wide_m), of) = (SMALL_CAR_M, readable::count(all));
+            list.push(format!(
+                "at least half of {of} vehicles are shorter than {long_m} m and narrower than {wide_m} m: are these half extents?"
             ));
         }
         let [all, faster] = self.cutters;

@@ -8,7 +8,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::criterion::CriteriaProfile;
 use crate::driver::{self, Bound, DriverProfile, ModelId};
-use lanesweep_support::plain_text::nearest;
 use lanesweep_support::ranges::refuse_repeats;
 use lanesweep_support::{Error, Place, Result, input_file, option};
 
@@ -160,11 +159,8 @@ impl Profile {
         }
         let path = Path::new(name_or_path);
         if !path.exists() && !name_or_path.ends_with(".toml") {
-            let near = nearest(name_or_path, Profile::names(), 0.0).unwrap_or("paper");
-            let names = Profile::names().collect::<Vec<_>>().join(", ");
-            let help = format!("did you mean `{near}`? Profiles: {names}; or give the path of a TOML file");
-            let problem = format!("there is no profile `{name_or_path}`");
-            return Err(Error::usage(Place::option("profile"), problem, help));
+            let (place, or) = (Place::option("profile"), "; or give the path of a TOML file");
+            return Err(Error::unknown(place, "profile", name_or_path, Profile::names(), or));
         }
         let text = input_file::read_text(path, input_file::MAX_SETTINGS_BYTES)?;
         let mut profile = Profile::parse(&text, &Place::file(path))?;

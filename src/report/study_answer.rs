@@ -18,15 +18,15 @@ const MAX_ROWS: usize = 12;
 /// Maximum characters of a list of parameterizations.
 const LIST: usize = 9;
 
-const HEADER: [&str; 7] = ["scenario", "driver", "best", "F1", "missed collisions", "ties with", "data for decision"];
+const HEADER: [&str; 7] = ["scenario", "driver", "best", "F1", "missed, invented", "ties with", "data for decision"];
 /// Index of the column with F1, or with the reason why it is missing.
 const SCORE: usize = 3;
 /// Columns of numbers.
 const NUMBERS: [usize; 2] = [4, 6];
 
 /// What the last columns say.
-const LEGEND: &str = "Missed: collisions of S that the best does not show. Ties: F1 within chance of the best's; 2.0x: \
-                      twice the scenarios would tell, if F1 stays.";
+const LEGEND: &str = "Missed, invented: collisions of S that the best does not show, and its own that S has not. Ties: F1 \
+                      within chance of the best's; 2.0x: twice the scenarios would tell, if F1 stays.";
 
 /// The rows, with the columns of words in an order.
 fn table(rows: &[[String; 7]], words: [usize; 4]) -> Table {
@@ -231,7 +231,7 @@ impl StudyReport<'_> {
             return [category, model, "-".to_owned(), text, String::new(), String::new(), needed];
         };
         let interval = format!("{:.2} [{:.2} {:.2}]", score.f1, score.interval.low, score.interval.high);
-        let missed = format!("{} of {}", count(score.hidden), count(best.failures));
+        let missed = format!("{}, {} of {}", count(score.missed), count(score.invented), count(best.failures));
         let ties = if score.rivals.is_empty() { "-".to_owned() } else { list(&score.rivals) };
         [category, model, short_name(&score.variant).to_owned(), interval, missed, ties, needed]
     }

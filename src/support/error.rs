@@ -7,7 +7,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU8, Ordering};
 
-use crate::plain_text::{MAX_PATH, cut, cut_names, shown_in_line};
+use crate::plain_text::{MAX_PATH, cut, cut_names, nearest, shown_in_line};
 
 /// Result of everything in this library that can fail on a user's input.
 pub type Result<T> = std::result::Result<T, Error>;
@@ -212,6 +212,23 @@ impl Error {
     /// A flag, key or profile that cannot be used.
     pub fn usage(place: Place, problem: impl Into<String>, help: impl Into<String>) -> Self {
         Error::Usage { place: Box::new(place), problem: cut_names(&problem.into()), help: help.into() }
+    }
+
+    /// A name that nothing has: the help has the most similar of `names`, all of them, and what else is possible (`or`).
+    pub fn unknown<'a>(
+        place: Place,
+        what: &str,
+        name: &str,
+        names: impl IntoIterator<Item = &'a str>,
+        or: &str,
+    ) -> Self {
+        let names: Vec<&str> = names.into_iter().collect();
+        let all = names.join(", ");
+        let help = match nearest(name, names, 0.6) {
+            Some(near) => format!("did you mean `{near}`? There are {all}{or}"),
+            None => format!("use one of {all}{or}"),
+        };
+        Error::usage(place, format!("there is no {what} `{name}`"), help)
     }
 
     /// A compute device that is missing or failed.

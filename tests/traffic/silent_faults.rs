@@ -34,7 +34,7 @@ fn each_track(change: impl Fn(&mut Track)) -> Recording {
 }
 
 /// What good recordings must not be told.
-const WORDS: [&str; 13] = [
+const WORDS: [&str; 14] = [
     "half extents",
     "none is longer",
     "have another unit or scale",
@@ -48,6 +48,7 @@ const WORDS: [&str; 13] = [
     "no vehicle drives between",
     "less than 1 m apart",
     "are swapped",
+    "drive elsewhere across the road",
 ];
 
 #[test]
@@ -298,5 +299,19 @@ fn sizes_and_speeds_that_are_wrong_in_a_part_are_told() {
         let of = [faster(|track| track.carriageway == 0), faster(|track| track.carriageway == 1)];
         let of = &of[carriageway];
         assert!(says(of, &format!("{way}: vehicles move 0.909 times")) || !of.is_usable(), "{:?}", of.findings);
+    }
+}
+
+#[test]
+fn two_places_one_after_the_other_in_one_recording_are_told() {
+    let recording = generated();
+    let middle = recording.tracks.iter().map(|of| of.first_frame).max().unwrap() / 2;
+    let late = recording.tracks.iter().filter(|of| of.first_frame > middle).map(|of| of.id.to_string());
+    let late: Vec<String> = late.collect();
+    for (by_m, is_told) in [(1.5, true), (6.0, true), (0.1, false)] {
+        let mut table = Plain::of(&recording, 5);
+        table.map("y", |y, row| if late.contains(&row[0]) { y + by_m } else { y });
+        let about = understood(&table, &|_| ()).unwrap();
+        assert_eq!(says(&about, "drive elsewhere across the road"), is_told, "{by_m}: {:?}", about.findings);
     }
 }

@@ -5,7 +5,6 @@ use std::sync::LazyLock;
 use lanesweep_model::plausibility::{Doubts, HELP, Quantity};
 use lanesweep_model::profile::Profile;
 use lanesweep_model::scenario::{CaseNumber, CaseQuantity, Category, LANE_WIDTH_M, NUMBERS, PlainCase, check_headway};
-use lanesweep_support::plain_text::nearest;
 use lanesweep_support::{Error, Place, Result, option};
 
 /// A parameter as named in flags, tables and files.
@@ -68,15 +67,8 @@ impl MapParameter {
         if let Some(found) = of_category().find(|p| p.key == key) {
             return Ok(found);
         }
-        let near = nearest(key, of_category().map(|p| p.key), 0.0);
-        let keys: Vec<&str> = of_category().map(|p| p.key).collect();
-        let help = match near {
-            Some(near) => format!("did you mean `{near}`? There are {}", keys.join(", ")),
-            None => format!("there are {}", keys.join(", ")),
-        };
-        let article = if category == Category::Lvd { "an" } else { "a" };
-        let problem = format!("{article} {} has no parameter `{key}`", category.label());
-        Err(Error::usage(Place::item(flag), problem, help))
+        let what = format!("parameter of {}s", category.label());
+        Err(Error::unknown(Place::item(flag), &what, key, of_category().map(|p| p.key), ""))
     }
 
     /// Refuses two parameters that set one quantity; a relative speed sets the speed of the other vehicle.

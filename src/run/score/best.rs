@@ -38,8 +38,10 @@ pub struct BestScore {
     pub f1: f64,
     /// Interval of F1 over scenarios.
     pub interval: ScoreInterval,
-    /// Number of failures of S that it hides.
-    pub hidden: u64,
+    /// Number of runs that fail in S alone.
+    pub missed: u64,
+    /// Number of runs that fail in it alone.
+    pub invented: u64,
     /// Parameterizations whose F1 is not significantly different.
     pub rivals: Vec<String>,
 }
@@ -101,6 +103,7 @@ fn best_score(
             more_data = more_data.max(if distance > 0.0 { times } else { f64::INFINITY });
         }
     }
-    let (interval, hidden) = (rate(best).interval(level), scores.cells[best].counts.fn_);
-    Some((BestScore { variant: name(best), f1: value, interval, hidden, rivals }, more_data))
+    let (interval, counts) = (rate(best).interval(level), scores.cells[best].counts);
+    let (missed, invented) = (counts.fn_, counts.fp);
+    Some((BestScore { variant: name(best), f1: value, interval, missed, invented, rivals }, more_data))
 }

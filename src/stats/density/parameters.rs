@@ -24,7 +24,6 @@ use lanesweep_model::scenario::parameterization::{
     ReducedScenario, ReducedSeries, Reduction, Sizes, Variable,
 };
 use lanesweep_model::scenario::{Case, Category, Scenario};
-use lanesweep_support::plain_text::nearest;
 use lanesweep_support::{Error, Place, Result};
 
 /// Ordered parameters of one parameterization.
@@ -196,14 +195,8 @@ impl ParameterSpace {
         if let Some(index) = self.parameters.iter().position(|p| p.name == name) {
             return Ok(index);
         }
-        let names: Vec<&str> = self.parameters.iter().map(|p| p.name.as_str()).collect();
-        let near =
-            nearest(name, names.iter().copied(), 0.0).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-        Err(Error::usage(
-            Place::item(self.id.name()),
-            format!("there is no parameter `{name}`{near}"),
-            format!("use one of {}", names.join(", ")),
-        ))
+        let names = self.parameters.iter().map(|p| p.name.as_str());
+        Err(Error::unknown(Place::item(self.id.name()), "parameter", name, names, ""))
     }
 
     /// The parameters with the bounds of a draw.

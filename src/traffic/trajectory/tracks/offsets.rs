@@ -17,20 +17,12 @@ const MAX_OVERLAPPING: f64 = 0.1;
 const MIN_EDGE: f64 = 0.6;
 /// Distance of a lane line from the middle between the vehicles of its lanes from which on it is not where they see it, m.
 const MAX_LINE_OFF_M: f64 = 0.45;
-/// Length and width that the median car exceeds, m.
-const SMALL_CAR_M: (f64, f64) = (3.3, 1.4);
+/// A larger fraction of the vehicles of a direction does not change its place across the road from part to part of a recording.
+const MAX_MOVED: f64 = 0.3;
 
 impl Understanding {
-    /// Finds half extents, and lengths that end at one value.
+    /// Finds lengths that end at one value.
     pub(super) fn check_sizes(&mut self, recording: &Recording) {
-        let sizes =
-            recording.tracks.iter().filter(|of| of.class == VehicleClass::Car).map(|of| (of.length_m, of.width_m));
-        let (mut lengths, mut widths): (Vec<f64>, Vec<f64>) = sizes.unzip();
-        let (long_m, wide_m) = (median(&mut lengths), median(&mut widths));
-        if lengths.len() >= MIN_VEHICLES && long_m < SMALL_CAR_M.0 && wide_m < SMALL_CAR_M.1 {
-            let (long_m, wide_m) = (significant(long_m, 3), significant(wide_m, 2));
-            self.warn(format!("cars are {long_m} m long and {wide_m} m wide (medians): are these half extents?"));
-        }
         let mut lengths: Vec<f64> =
             recording.tracks.iter().filter(|of| of.class == VehicleClass::Truck).map(|of| of.length_m).collect();
         lengths.sort_by(f64::total_cmp);
@@ -43,6 +35,34 @@ impl Understanding {
                 "most lorries are {} m long, and none is longer: were lengths cut off there?",
                 significant(longest_m, 3)
             ));
+        }
+    }
+
+    /// Compares where vehicles drive across the road in the parts of a recording.
+    pub(super) fn check_parts(&mut self, recording: &Recording) {
+        for (at, carriageway) in recording.carriageways.iter().enumerate() {
+            let of = recording.tracks.iter().filter(|of| of.carriageway == at);
+            let mut of: Vec<(i64, f64)> =
+                of.map(|of| (of.first_frame, of.d_m.iter().sum::<f64>() / of.len() as f64)).collect();
+            of.sort_by_key(|(first_frame, _)| *first_frame);
+            let changed = |parts: &usize| {
+                let (before, after) = of.split_at(parts * of.len() / 8);
+                let sorted = |part: &[(i64, f64)]| {
+                    let mut d_m: Vec<f64> = part.iter().map(|(_, d_m)| *d_m).collect();
+                    d_m.sort_by(f64::total_cmp);
+                    d_m
+                };
+                let parts = [sorted(before), sorted(after)];
+                let share = |of: &[f64], d_m: f64| of.partition_point(|other| *other <= d_m) as f64 / of.len() as f64;
+                let difference = |d_m: &f64| (share(&parts[0], *d_m) - share(&parts[1], *d_m)).abs();
+                let largest = parts.iter().flatten().map(difference).fold(0.0, f64::max);
+                // Beyond Kolmogorov and Smirnov's limit, by what lanes gain or lose with the traffic.
+                largest > MAX_MOVED + 1.63 * (1.0 / before.len() as f64 + 1.0 / after.len() as f64).sqrt()
+            };
+            if let Some(parts) = (1..8).find(changed) {
+                let (way, frame) = (way(carriageway), of[parts * of.len() / 8].0);
+                self.warn(format!("{way}: vehicles drive elsewhere across the road after frame {frame} or soon: if these are two places, or the camera moved, give each part its own file, or name it in a column `recording`"));
+            }
         }
     }
 

@@ -6,7 +6,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::roles::{ColumnName, Role};
-use lanesweep_support::plain_text::{nearest, sha256};
+use lanesweep_support::plain_text::sha256;
 use lanesweep_support::{Error, Place, Result, input_file, settings};
 
 /// Columns by their meaning.
@@ -199,11 +199,7 @@ impl Preset {
             return Preset::parse(text, Place::item(format!("preset {name}")));
         }
         if !name.ends_with(".toml") {
-            let near = nearest(name, Preset::names(), 0.6);
-            let near = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-            let all = Preset::names().collect::<Vec<_>>().join(", ");
-            let (problem, help) = (format!("there is no preset `{name}`{near}"), format!("use {all}, or a .toml file"));
-            return Err(Error::usage(Place::option("preset"), problem, help));
+            return Err(Error::unknown(Place::option("preset"), "preset", name, Preset::names(), ", or a .toml file"));
         }
         let path = Path::new(name);
         let text = input_file::read_text(path, input_file::MAX_SETTINGS_BYTES)?;

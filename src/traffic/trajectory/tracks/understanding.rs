@@ -204,6 +204,7 @@ impl Understanding {
         self.check_resolution(recording);
         self.check_axes(recording, preset);
         self.check_boxes(recording);
+        self.check_parts(recording);
         self.clear_noise(recording);
         for (index, of) in recording.carriageways.iter().enumerate() {
             let widths = of.lane_lines_m.windows(2).map(|two| significant(two[0] - two[1], 3));
