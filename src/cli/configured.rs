@@ -10,10 +10,12 @@ use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, FromArgMatches};
 use indicatif::ProgressBar;
 
 use super::console::{self, Total, Verbosity};
-use super::help::{DATA, MODELS, RUN};
+use super::help::RUN;
 use super::signals::CANCEL;
 use super::{COMMIT, Cli, Verb};
-use crate::settings::{Assignment, FILE_VARIABLE, Key, KeyKind, Layers, Origin, Setting, Settings};
+use crate::settings::{
+    Assignment, FILE_VARIABLE, Key, KeyFlag, KeyKind, Layers, Origin, Setting, Settings, keys_in_order,
+};
 use lanesweep_engine::{BackendChoice, DeviceName, Executor, OpenBackend};
 use lanesweep_model::profile::Profile;
 use lanesweep_report::host::{Host, SettingRecord};
@@ -34,36 +36,6 @@ pub(super) struct Configured {
     started: Instant,
 }
 
-/// A flag that sets a key: the key, the flag, the value's name unless the key defines it, its heading, and
-/// its verbs. Range, default and help are the key's.
-type KeyFlag = (&'static str, &'static str, &'static str, &'static str, &'static [&'static str]);
-
-const SWEEPING: &[&str] = &["study", "sample", "map", "verify", "show"];
-const SIMULATING: &[&str] = &["study", "sample", "map", "verify", "show", "simulate"];
-const GENERATING: &[&str] = &["study", "fit", "verify", "show"];
-
-#[rustfmt::skip] // a table: one line per flag
-pub(super) const FLAGS: [KeyFlag; 18] = [
-    ("run.threads", "threads", "", RUN, &["lanesweep"]),
-    ("run.backend", "backend", "", RUN, SWEEPING),
-    ("run.device", "device", "NAME|pci:BUS|INDEX", RUN, SWEEPING),
-    ("run.backend", "backend", "", RUN, &["check"]),
-    ("run.device", "device", "NAME|pci:BUS|INDEX", RUN, &["check"]),
-    ("run.profile", "profile", "NAME|FILE", MODELS, SIMULATING),
-    ("run.dt_s", "dt", "", MODELS, SIMULATING),
-    ("generator.recordings", "synth_recordings", "", DATA, GENERATING),
-    ("generator.recordings", "synth_recordings", "", DATA, &["tracks"]),
-    ("score.seed", "seed", "", RUN, &["study"]),
-    ("fit.seed", "seed", "", RUN, &["fit"]),
-    ("sample.estimator", "estimator", "", MODELS, &["sample"]),
-    ("sample.samples", "samples", "", MODELS, &["sample"]),
-    ("sample.criterion", "criterion", "", MODELS, &["sample"]),
-    ("sample.level", "level", "", MODELS, &["sample"]),
-    ("sample.half_width", "half_width", "", MODELS, &["sample"]),
-    ("sample.time_limit_s", "time_limit", "", MODELS, &["sample"]),
-    ("sample.seed", "seed", "", RUN, &["sample"]),
-];
-
 /// Tables and keys that determine a plan's lanes; a plan file already contains them.
 const OF_THE_PLAN: [&str; 9] = [
     "generator.",
@@ -79,12 +51,13 @@ const OF_THE_PLAN: [&str; 9] = [
 
 /// The command line, with `--config` for every verb and the flags that set keys.
 pub(super) fn command() -> Command {
-    super::help::laid_out(with_flags(with_config(Cli::command()), &Key::all()))
+    super::help::laid_out(with_flags(with_config(Cli::command()), &keys_in_order()))
 }
 
 /// The flags of a verb that set keys.
-fn flags_of(verb: &str) -> impl Iterator<Item = KeyFlag> {
-    FLAGS.into_iter().filter(move |flag| flag.4.contains(&verb))
+fn flags_of<'a>(keys: &'a [Key], verb: &'a str) -> impl Iterator<Item = (&'a Key, &'a KeyFlag)> {
+    let flags = keys.iter().filter_map(|key| Some((key, key.flag.as_ref()?)));
+    flags.filter(move |(_, flag)| flag.verbs.iter().any(|of| of == verb))
 }
 
 /// Adds the flags that set keys.
@@ -94,15 +67,14 @@ fn with_flags(mut command: Command, keys: &[Key]) -> Command {
     let has_plan = has("plan");
     let data: Vec<&str> = ["recordings", "scenarios", "paths"].into_iter().filter(|id| has(id)).collect();
     let verb = command.get_name().to_owned();
-    for (name, id, value_name, heading, _) in flags_of(&verb) {
-        let Some(key) = Key::find(keys, name) else { continue };
-        let mut arg = flag(key, id, value_name).help_heading(heading);
+    for (key, KeyFlag { name, heading, value, .. }) in flags_of(keys, &verb) {
+        let mut arg = flag(key, name, value).help_heading(heading.clone());
         // What is global is told with the verbs.
-        arg = arg.global(name == "run.threads").hide_short_help(name == "run.threads");
-        if has_plan && is_of_plan(name) {
+        arg = arg.global(verb == "lanesweep").hide_short_help(verb == "lanesweep");
+        if has_plan && is_of_plan(&key.name) {
             arg = arg.conflicts_with("plan");
         }
-        if name == "generator.recordings" {
+        if key.name == "generator.recordings" {
             arg = arg.conflicts_with_all(&data);
         }
         command = command.arg(arg);
@@ -112,7 +84,7 @@ fn with_flags(mut command: Command, keys: &[Key]) -> Command {
 
 /// Builds the flag of a key. The first sentence of the description is the short help; `Without it: X.` is the default
 /// if there is no default value.
-fn flag(key: &Key, id: &'static str, value_name: &'static str) -> Arg {
+fn flag(key: &Key, id: &str, value_name: &str) -> Arg {
     let (text, unset) = match key.description.split_once(" Without it: ") {
         Some((text, unset)) => (text, format!(" [default: {}]", unset.trim_end_matches('.'))),
         None => (&*key.description, String::new()),
@@ -120,7 +92,7 @@ fn flag(key: &Key, id: &'static str, value_name: &'static str) -> Arg {
     let (short, more) = text.split_once(". ").unwrap_or((text, ""));
     // The unit is the name of the value.
     let short = format!("{}{unset}", short.trim_end_matches('.').trim_end_matches(", s"));
-    let mut arg = Arg::new(id).long(id.replace('_', "-")).help(short.clone());
+    let mut arg = Arg::new(id.to_owned()).long(id.replace('_', "-")).help(short.clone());
     if !more.is_empty() {
         arg = arg.long_help(format!("{short}\n\n{more}"));
     }
@@ -149,7 +121,7 @@ fn flag(key: &Key, id: &'static str, value_name: &'static str) -> Arg {
             };
             arg.value_name(name).allow_negative_numbers(true)
         }
-        KeyKind::Boolean | KeyKind::Text => arg.value_name(value_name),
+        KeyKind::Boolean | KeyKind::Text => arg.value_name(value_name.to_owned()),
     }
 }
 
@@ -193,11 +165,12 @@ impl Configured {
         let (path, typed, last) = verb_of(matches);
         let mut layers = if reads_configuration(&path) { layers(&typed)? } else { Layers::defaults() };
         let verb = path.last().unwrap_or(&"");
-        for (key, id, ..) in flags_of("lanesweep").chain(flags_of(verb)) {
-            if last.value_source(id) == Some(ValueSource::CommandLine)
-                && let Some(word) = last.get_raw(id).and_then(|mut words| words.next())
+        let keys = Key::all();
+        for (key, KeyFlag { name, .. }) in flags_of(&keys, "lanesweep").chain(flags_of(&keys, verb)) {
+            if last.value_source(name) == Some(ValueSource::CommandLine)
+                && let Some(word) = last.get_raw(name).and_then(|mut words| words.next())
             {
-                layers.flag(key, &option(id), &word.to_string_lossy())?;
+                layers.flag(&key.name, &option(name), &word.to_string_lossy())?;
             }
         }
         let configured = Configured::combined(layers, command, cli.common.verbosity())?;

@@ -308,7 +308,10 @@ pub(super) fn refuse(error: &clap::Error) -> Result<Exit> {
     let one_line = |part: &str| part.split_whitespace().collect::<Vec<_>>().join(" ");
     let parts: Vec<String> = safe.split("\n\n").map(one_line).collect();
     let after = |words: &'static str| parts.iter().filter_map(move |part| part.strip_prefix(words));
-    let help: Vec<&str> = after("tip: ").chain(after("Usage: ")).chain(after("For more information, ")).collect();
+    let tips = after("tip: ").map(str::to_owned);
+    let usage = after("Usage: ").map(|usage| format!("usage: {usage}"));
+    let more = after("For more information, ").map(|more| more.trim_end_matches('.').to_owned());
+    let help: Vec<String> = tips.chain(usage).chain(more).collect();
     let problem = after("error: ").next().unwrap_or(&safe);
     complain(&Error::usage(Place::item("lanesweep"), problem, help.join("\n")));
     Ok(Exit::Usage)

@@ -21,6 +21,22 @@ pub struct Key {
     pub kind: KeyKind,
     /// Default; `None` if the key has none.
     pub default: Option<Value>,
+    /// Its flag, if it has one.
+    pub flag: Option<KeyFlag>,
+}
+
+/// The flag of a key, from `x-flag`, `x-verbs`, `x-heading` and `x-value` in the schema. Range, default and help are the
+/// key's.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KeyFlag {
+    /// Its name, with `_`.
+    pub name: String,
+    /// The verbs that have it; `lanesweep` means all.
+    pub verbs: Vec<String>,
+    /// The heading in the help.
+    pub heading: String,
+    /// Name of a value that is any text.
+    pub value: String,
 }
 
 /// Valid values of a key.
@@ -88,10 +104,17 @@ fn collect(schema: &Value, prefix: &str, keys: &mut Vec<Key>) {
         keys.push(Key {
             description: property["description"].as_str().unwrap_or_default().to_owned(),
             kind: kind_of(property),
+            flag: flag_of(property),
             default: property.get("default").filter(|value| !value.is_null()).cloned(),
             name,
         });
     }
+}
+
+fn flag_of(property: &Value) -> Option<KeyFlag> {
+    let text = |name: &str| property[name].as_str().unwrap_or_default().to_owned();
+    let verbs = property["x-verbs"].as_array()?.iter().filter_map(|verb| Some(verb.as_str()?.to_owned())).collect();
+    Some(KeyFlag { name: text("x-flag"), verbs, heading: text("x-heading"), value: text("x-value") })
 }
 
 fn kind_of(property: &Value) -> KeyKind {
@@ -218,7 +241,7 @@ pub(crate) const DEFAULT_FILE: &str = include_str!("../../../configs/default.tom
 pub(crate) const DEFAULT_FILE_NAME: &str = "lanesweep.toml";
 
 /// All keys in the order of the default file, which is chosen for readers.
-pub(super) fn keys_in_order() -> Vec<Key> {
+pub(crate) fn keys_in_order() -> Vec<Key> {
     let names: Vec<String> = names(DEFAULT_FILE);
     let mut keys = Key::all();
     keys.sort_by_key(|key| names.iter().position(|name| *name == key.name).unwrap_or(usize::MAX));

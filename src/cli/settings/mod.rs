@@ -11,7 +11,7 @@ mod schema;
 mod tables;
 
 pub(crate) use file::FILE_VARIABLE;
-pub(crate) use keys::{DEFAULT_FILE, DEFAULT_FILE_NAME, text_of};
+pub(crate) use keys::{DEFAULT_FILE, DEFAULT_FILE_NAME, KeyFlag, keys_in_order, text_of};
 pub use keys::{Key, KeyKind};
 pub(crate) use layers::{Assignment, Layers, Origin, Setting};
 pub(crate) use schema::{profile_schema, settings_schema};

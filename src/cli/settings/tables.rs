@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::help::{MODELS, RUN};
 use lanesweep_engine::BackendChoice;
 use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::Bound;
@@ -13,7 +14,12 @@ use lanesweep_support::settings;
 use lanesweep_traffic::mining::MiningOptions;
 use lanesweep_traffic::trajectory::generator::GeneratorOptions;
 
-/// Everything that may be set.
+/// Verbs that choose a device.
+const ON_DEVICES: [&str; 6] = ["study", "sample", "map", "verify", "show", "check"];
+/// Verbs that simulate under one profile.
+const SIMULATING: [&str; 6] = ["study", "sample", "map", "verify", "show", "simulate"];
+
+/// Everything that may be set. A key with `x-flag` has that flag too, in the verbs `x-verbs`: see [`super::keys::KeyFlag`].
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(title = "lanesweep configuration")]
@@ -55,19 +61,25 @@ settings! {
         /// Threads; results do not depend on it. Without it: all cores.
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(range(min = 1, max = 4096))]
+        #[schemars(extend("x-flag" = "threads", "x-verbs" = ["lanesweep"], "x-heading" = RUN))]
         pub threads: Option<usize> = None,
         /// Backend; auto: a GPU if there is one.
+        #[schemars(extend("x-flag" = "backend", "x-verbs" = ON_DEVICES, "x-heading" = RUN))]
         pub backend: BackendChoice = BackendChoice::Auto,
         /// Device, by part of its name, PCI bus id or index. `lanesweep devices` lists the devices. The default
         /// is the first GPU.
         #[serde(skip_serializing_if = "Option::is_none")]
+        #[schemars(extend("x-flag" = "device", "x-verbs" = ON_DEVICES, "x-heading" = RUN))]
+        #[schemars(extend("x-value" = "NAME|pci:BUS|INDEX"))]
         pub device: Option<String> = None,
         /// paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc` takes
         /// jrc-2021 unless it is set.
+        #[schemars(extend("x-flag" = "profile", "x-verbs" = SIMULATING, "x-heading" = MODELS, "x-value" = "NAME|FILE"))]
         pub profile: String = "paper".to_owned(),
         /// Time step, s. Without it: the profile's.
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(extend("minimum" = Bound::TIME_STEP.smallest, "maximum" = Bound::TIME_STEP.largest))]
+        #[schemars(extend("x-flag" = "dt", "x-verbs" = SIMULATING, "x-heading" = MODELS))]
         pub dt_s: Option<f64> = None,
         /// After this time, finish the current chunk and stop, as after Ctrl-C; the same command resumes, s. Without it:
         /// no limit.
@@ -116,6 +128,7 @@ settings! {
         /// Sign of the lateral series of densities and of the replays that are compared with them.
         pub svd_lateral: SvdLateral = FitOptions::default().parameterization.svd_lateral,
         /// Seed of P_valid.
+        #[schemars(extend("x-flag" = "seed", "x-verbs" = ["fit"], "x-heading" = RUN))]
         pub seed: u64 = FitOptions::default().seed,
         /// Number of draws for P_valid; with 10^9 its relative standard error is 0.01 % if it is 0.1.
         #[schemars(range(min = 1, max = 1_000_000_000))]
@@ -130,26 +143,32 @@ settings! {
     pub(crate) struct SampleSettings {
         /// Crude, importance, or the cheaper one. Importance sampling searches the failures, then draws
         /// around them; `auto` chooses for each model and headway, and is `mc` without a half-width.
+        #[schemars(extend("x-flag" = "estimator", "x-verbs" = ["sample"], "x-heading" = MODELS))]
         pub estimator: EstimatorKind = EstimatorKind::Auto,
         /// Number of samples. With a half-width: the maximum. Without it: 100000, or as needed.
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(range(min = 1))]
+        #[schemars(extend("x-flag" = "samples", "x-verbs" = ["sample"], "x-heading" = MODELS))]
         pub samples: Option<u64> = None,
         /// Criterion of importance sampling and of a half-width.
+        #[schemars(extend("x-flag" = "criterion", "x-verbs" = ["sample"], "x-heading" = MODELS))]
         pub criterion: Criterion = Criterion::Collision,
         /// Kind of interval of `mc`.
         pub interval: IntervalKind = IntervalKind::Wilson,
         /// Level of the intervals.
         #[schemars(extend("minimum" = 0.5, "exclusiveMaximum" = 1.0))]
+        #[schemars(extend("x-flag" = "level", "x-verbs" = ["sample"], "x-heading" = MODELS))]
         pub level: f64 = 0.95,
         /// Reach this half-width over estimate. It is that of the draws' interval; mc checks it after 4096·2^k
         /// samples. The default of is is 0.1 unless the number of samples is given; else none.
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(extend("exclusiveMinimum" = 0.0))]
+        #[schemars(extend("x-flag" = "half_width", "x-verbs" = ["sample"], "x-heading" = MODELS))]
         pub half_width: Option<f64> = None,
         /// Stop at the first check after this time (not reproducible), s. Without it: no limit.
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1e9))]
+        #[schemars(extend("x-flag" = "time_limit", "x-verbs" = ["sample"], "x-heading" = MODELS))]
         pub time_limit_s: Option<f64> = None,
         /// Lanes of each model and criterion in the table of failures, at most.
         #[schemars(range(min = 1))]
@@ -159,6 +178,7 @@ settings! {
         #[schemars(range(min = 1))]
         pub crude_lanes: u64 = 100_000_000,
         /// Seed of the draws.
+        #[schemars(extend("x-flag" = "seed", "x-verbs" = ["sample"], "x-heading" = RUN))]
         pub seed: u64 = 157,
     }
 }

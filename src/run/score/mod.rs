@@ -225,6 +225,7 @@ settings! {
     #[serde(deny_unknown_fields, default)]
     pub struct ScoreOptions {
         /// Seed that chooses the lanes to check on the CPU. No score depends on it.
+        #[schemars(extend("x-flag" = "seed", "x-verbs" = ["study"], "x-heading" = "Run"))]
         pub seed: u64 = 157,
         /// Coverage of the intervals (0.95).
         #[schemars(extend("minimum" = 0.5, "exclusiveMaximum" = 1.0))]

@@ -15,6 +15,8 @@ settings! {
         pub seed: u64 = 20_240_901,
         /// Number of generated recordings. They are called `01`, `02`, ….
         #[schemars(range(min = 1, max = 99))]
+        #[schemars(extend("x-flag" = "synth_recordings", "x-verbs" = ["study", "fit", "verify", "show", "tracks"]))]
+        #[schemars(extend("x-heading" = "Data"))]
         pub recordings: usize = 84,
         /// Length of each recording, s.
         #[schemars(range(min = 1.0, max = 7200.0))]
