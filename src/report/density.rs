@@ -31,9 +31,13 @@ pub fn text(model: &DensityModel) -> String {
         SearchEnd::Lower => "; the search ended at the rule's lower end",
         SearchEnd::Upper => "; the search ended at the rule's upper end",
     };
+    let likelihood = bandwidth.likelihood.map_or(String::new(), |of| {
+        let [best, low, high] = [of.best, of.low, of.high].map(short);
+        format!("; the likelihood's best is {best} [{low}, {high}]")
+    });
     let _ = writeln!(
         text,
-        "bandwidth  {} (rule `{}`; Silverman's {}){end}",
+        "bandwidth  {} (rule `{}`; Silverman's {}){end}{likelihood}",
         short(bandwidth.value),
         bandwidth.rule.key(),
         short(bandwidth.silverman)

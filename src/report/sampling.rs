@@ -194,7 +194,7 @@ impl SampleReport {
         }
         let is_compared = self.estimates.iter().any(|row| row.recorded.is_some_and(|of| of.sampled.is_some()));
         let rest = format!(
-            "Intervals at {} %{}. {}{}",
+            "Intervals at {} %: of the draws, and{}. {}{}",
             value(100.0 * self.level()),
             self.interval_rule(),
             if is_compared {
@@ -226,13 +226,19 @@ impl SampleReport {
         let sampled = |row: &EstimateRow| row.recorded.and_then(|recorded| recorded.sampled);
         let ratio = |row| sampled(row).and_then(|r| Some(format!("{} {}", short(r.ratio?), r.verdict.mark())));
         let possible = |row: &EstimateRow| row.no_traffic.map(|of| of.possible_probability);
-        let ends = |EstimateRow { estimate: e, .. }: &EstimateRow| {
-            NumberText(interval_text(e.interval.low, e.interval.high, e.interval.kind))
+        let kind = |row: &EstimateRow| row.estimate.interval.kind;
+        let of_draws = |row: &EstimateRow| NumberText(interval_text(row.draws[0], row.draws[1], kind(row)));
+        let of_scenarios = |row: &EstimateRow| {
+            let interval = &row.estimate.interval;
+            row.failing_scenarios.map(|scenarios| match scenarios < DETERMINING && row.estimate.failures > 0 {
+                true => "not determined".to_owned(),
+                false => interval_text(interval.low, interval.high, interval.kind),
+            })
         };
         self.named(self.estimates.iter().filter(|row| is_in(row)))
-            .column("failures", |row| row.estimate.failures)
             .column(three_digits("P"), |row| row.estimate.probability)
-            .column("interval", ends)
+            .column("of the draws", of_draws)
+            .column(Column::from("of scenarios").null("–"), |row| of_scenarios(row).map(NumberText))
             .columns(has(&|row| possible(row).is_some()).then_some("P possible"), three_digits, |row, _| possible(row))
             .columns(has(&|row| row.risk.per_hour.is_some()).then_some("per hour"), Column::from, |row, _| {
                 rate_text(row.risk.per_hour)
@@ -254,7 +260,7 @@ impl SampleReport {
         Table::of(rows)
             .column("model", |row| row.model.name())
             .column("criterion", |row| row.criterion.label())
-            .column("THW", |row| self.headway_cell(row))
+            .column("THW", |row| row.headway.as_str())
     }
 
     /// What the importance weights indicate, for those estimates that have them.
@@ -288,6 +294,9 @@ fn weight<V>(of: impl Fn(&WeightFigures) -> V) -> impl Fn(&EstimateRow) -> Optio
 fn three_digits(name: &'static str) -> Column {
     Column::from(name).digits(Digits::Significant(3))
 }
+
+/// Effective number of failing scenarios below which data do not determine P.
+const DETERMINING: f64 = 3.0;
 
 /// Number of notes on the terminal.
 const MAX_NOTES: usize = 5;

@@ -60,16 +60,13 @@ impl SampleReport {
         let [p, low, high] = [row.estimate.probability, row.estimate.interval.low, row.estimate.interval.high];
         let [p, low, high] = [p, low, high].map(|share| significant(100.0 * share, 2));
         let (model, criterion) = (row.model.name(), row.criterion.label());
-        format!(
-            "Highest: {model} fails {criterion} in {p} % [{low} {high}] of the runs (THW {}). ",
-            self.headway_cell(row)
-        )
+        format!("Highest: {model} fails {criterion} in {p} % [{low} {high}] of the runs (THW {}). ", row.headway)
     }
 
     fn estimates_section(&self) -> Section {
         let estimates = self.table(|row| row.is_told(&self.estimates));
         let mut tables = vec![estimates.captioned(format!(
-            "Probability of failure, and risk where the exposure is known. Intervals at {} %{}",
+            "Probability of failure, and risk where the exposure is known. Intervals at {} %: of the draws, and{}",
             value(100.0 * self.level()),
             self.interval_rule()
         ))];

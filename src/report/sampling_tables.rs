@@ -54,6 +54,11 @@ impl SampleReport {
             .column("variance_reduction", |row| known(row.estimate.variance_reduction))
             .column("no_traffic_fraction", |row| row.no_traffic.map(|of| of.fraction))
             .column("possible_probability", |row| row.no_traffic.map(|of| of.possible_probability))
+            .columns(
+                [("probability_narrow", 0), ("probability_wide", 1)],
+                |(name, _)| name,
+                |row, (_, end)| row.at_bandwidths[end].and_then(|of| known(of.probability)),
+            )
             .columns(weights, |(name, _)| name, |row, (_, of)| row.estimate.weights.as_ref().and_then(|w| known(of(w))))
             .columns(risks, |(end, _)| format!("{hour}{end}"), |row, (_, of)| per_hour(row).and_then(|r| known(of(&r))))
             .columns(
@@ -121,6 +126,8 @@ impl SampleReport {
             for warning in &row.estimate.trust.warnings {
                 match warning {
                     Warning::FewScenarios { scenarios } => few.push(*scenarios),
+                    // The rule tells it of all rows.
+                    Warning::BandwidthDecides { .. } => (),
                     _ => remarks.push((name(row), warning.to_string())),
                 }
             }
@@ -150,11 +157,6 @@ impl SampleReport {
 }
 
 impl SampleReport {
-    /// The headway of a row, or the number of headways that P averages.
-    pub(super) fn headway_cell(&self, row: &EstimateRow) -> String {
-        if row.headway == "all" { format!("all {}", self.headways.len()) } else { row.headway.clone() }
-    }
-
     /// How to read the estimates, one sentence after the other.
     pub(super) fn rules(&self) -> impl Iterator<Item = String> {
         self.cautions().chain(self.sources_rule()).chain(self.recorded_rule())
@@ -162,7 +164,30 @@ impl SampleReport {
 
     /// Those of them without which a number is taken for another.
     pub(super) fn cautions(&self) -> impl Iterator<Item = String> {
-        [self.traffic_rule(), self.tail_rule(), self.exposure_rule(), self.mean_rule()].into_iter().flatten()
+        let rules =
+            [self.bandwidth_rule(), self.traffic_rule(), self.tail_rule(), self.exposure_rule(), self.mean_rule()];
+        rules.into_iter().flatten()
+    }
+
+    /// How far the bandwidth changes the told rows; `None` if the density does not know its interval.
+    fn bandwidth_rule(&self) -> Option<String> {
+        let told = || self.estimates.iter().filter(|row| row.is_told(&self.estimates));
+        let [Some(narrow), Some(wide)] = told().next()?.at_bandwidths else { return None };
+        let [narrow, wide] = [narrow, wide].map(|of| significant(of.factor, 2));
+        let all = told().count();
+        let deciding = told().filter(|row| {
+            row.estimate.trust.warnings.iter().any(|warning| matches!(warning, Warning::BandwidthDecides { .. }))
+        });
+        Some(match deciding.count() {
+            0 => format!(
+                "The bandwidth decides no row: at {narrow} and {wide} times the density's, the ends of its 95 % interval, P stays \
+                 within a quarter or chance"
+            ),
+            rows => format!(
+                "The bandwidth decides {rows} of {all} rows: at {narrow} and {wide} times the density's, the ends of its 95 % interval, \
+                 P differs by more than a quarter and chance (`probability_narrow`, `probability_wide` in estimates.csv)"
+            ),
+        })
     }
 
     /// What P over all headways averages; `None` for a single headway.
@@ -248,9 +273,9 @@ impl SampleReport {
     /// What the intervals cover in addition to the draws.
     pub(super) fn interval_rule(&self) -> &'static str {
         if self.estimates.iter().all(|row| row.failing_scenarios.is_some()) {
-            " cover the draws and what other scenarios would change, at fixed bandwidth and scale"
+            " of draws and scenarios, at fixed bandwidth and scale; not determined: fewer than 3 scenarios carry P"
         } else {
-            " cover the draws alone, not what other scenarios would change"
+            " none of what other scenarios would change"
         }
     }
 }

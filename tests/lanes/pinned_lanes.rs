@@ -108,8 +108,13 @@ fn samples(digests: &mut [Sha256; 2], profile: &Profile) {
         let space = ParameterSpace::new(id, &options, reduction.as_ref(), false).unwrap();
         let d = space.dimensions();
         let mean = |k: usize| (0..d).map(|at| 1.0 + ((at * 5 + k * 3) % 7) as f64).collect::<Vec<f64>>();
-        let bandwidth =
-            Bandwidth { value: 1.0, rule: BandwidthRule::Reduction, silverman: 1.0, end: SearchEnd::Inside };
+        let bandwidth = Bandwidth {
+            value: 1.0,
+            rule: BandwidthRule::Reduction,
+            silverman: 1.0,
+            end: SearchEnd::Inside,
+            likelihood: None,
+        };
         let kde = Kde::from_parts((0..3).map(mean).collect(), vec![0.75; d], bandwidth).unwrap();
         let sizes = Sizes::of(&scenario(Category::CutOut, 0));
         let stream = Stream { seed: 157, purpose: SAMPLE_PURPOSE };

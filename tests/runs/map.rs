@@ -326,7 +326,7 @@ fn what_makes_no_map_is_answered_with_what_would() {
     for (flags, hint) in [
         ("--x gap_m=1..60/0 Y S", "a step of 0"),
         ("--x gap_m=3,2 Y S", "rising order"),
-        ("--x ahead_gap_m=1..60/1 Y S", "a cut-in has no parameter"),
+        ("--x ahead_gap_m=1..60/1 Y S", "there is no parameter of cut-ins"),
         ("--x gap_m=1..60/0.00001 Y S", "longer step"),
         ("--x gap_m=0..9999/0.2 --y lateral_speed_mps=0.1..1.7/0.01 S", "longer steps or fewer"),
         ("--x gap_m=-5..60/1 Y S", "at least 0"),

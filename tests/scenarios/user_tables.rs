@@ -188,7 +188,13 @@ fn what_is_wrong_with_parameters_is_told_with_line_and_column() {
     let cases = [
         ("speed_mps,thw", "sped,thw", "line 1, column `sped`", "no such column", "did you mean `speed`?"),
         ("lateral_speed", "lateral_speed_ms", "column `lateral_speed_ms`", "milliseconds", "`lateral_speed_mps`"),
-        ("cut-in,FSM", "cutin,FSM", "line 2, column `category`", "no category `cutin`", "use cut-in, cut-out or lvd"),
+        (
+            "cut-in,FSM",
+            "cutin,FSM",
+            "line 2, column `category`",
+            "no category `cutin`",
+            "did you mean `cut-in`? There are cut-in, cut-out, LVD",
+        ),
         ("FSM,108,20", "FSM,,20", "line 2, column `ego_speed_kmh`", "missing", "such as 60km/h"),
         ("1.2,,1.0", "1.2,8,1.0", "line 2, column `thw`", "both gap and time headway", "leave one of the two empty"),
         ("-6,0", "-6,40m/s", "line 3, column `end_speed`", "cannot be reached", "sign"),

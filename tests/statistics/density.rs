@@ -55,7 +55,8 @@ fn names(d: usize) -> Vec<&'static str> {
 }
 
 fn with_bandwidth(points: Vec<Vec<f64>>, scale: Vec<f64>, value: f64) -> Kde {
-    let bandwidth = Bandwidth { value, rule: BandwidthRule::Wide, silverman: value, end: SearchEnd::Inside };
+    let bandwidth =
+        Bandwidth { value, rule: BandwidthRule::Wide, silverman: value, end: SearchEnd::Inside, likelihood: None };
     Kde::from_parts(points, scale, bandwidth).unwrap()
 }
 
@@ -278,7 +279,7 @@ fn every_kind_of_impossible_point_is_refused_by_its_parameter() {
     point[at] = -0.1;
     assert_eq!(refused(&b, &point), "gap_lead_m");
     let error = b.index_of("gap_m").unwrap_err();
-    assert!(error.to_string().contains("did you mean `gap_lead_m`"), "{error}");
+    assert!(error.help().unwrap().contains("did you mean `gap_lead_m`"), "{error:?}");
 }
 
 #[test]

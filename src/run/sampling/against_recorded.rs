@@ -71,8 +71,8 @@ pub const TRAFFIC_DRAWS: u64 = 20_000;
 const PURPOSE: u32 = 0x7261_6666;
 
 impl Sample {
-    /// Adds the rates of the recorded scenarios to the result, and what draws without possible traffic are of it. Adds a
-    /// warning if the rates differ, if there are too few failures, or if the density does not contain its scenarios.
+    /// Adds the rates of the recorded scenarios to the result, P at other bandwidths, and what draws without possible traffic
+    /// are of it. Adds a warning if the rates differ, if there are too few failures, or if the density does not contain its scenarios.
     ///
     /// # Errors
     /// Those of the lanes of S and S'.
@@ -84,6 +84,7 @@ impl Sample {
             SampleHeadways::Sampled => vec![Headway::Observed],
         };
         self.count_no_traffic(&mut result.rows, &headways)?;
+        result = self.at_bandwidths(result)?;
         let is_comparable = !density.scenarios.is_empty();
         let replayed = is_comparable.then(|| replay(density, &self.profile, &options.models, &headways));
         let Some([recorded, replayed]) = replayed.transpose()?.flatten() else {

@@ -3,6 +3,7 @@
 
 use serde::Serialize;
 
+use super::bandwidth::AtBandwidth;
 use super::sample_options::SampleOptions;
 use super::uncertainty::Uncertainty;
 use lanesweep_engine::{LanePlan, SampleTally, cell_of};
@@ -47,6 +48,8 @@ pub struct EstimateRow {
     pub recorded: Option<RecordedRatios>,
     /// What draws without possible traffic are of it; `None` where every draw is possible.
     pub no_traffic: Option<NoTraffic>,
+    /// P at the lower and at the upper end of the interval of the density's bandwidth; none if the density does not know it.
+    pub at_bandwidths: [Option<AtBandwidth>; 2],
 }
 
 /// Ratios of failure rates to that of S, over the same scenarios, headways, model and criterion.
@@ -112,6 +115,7 @@ impl EstimateRow {
             uncertainty: None,
             recorded: None,
             no_traffic: None,
+            at_bandwidths: [None; 2],
         }
     }
 

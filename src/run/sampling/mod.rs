@@ -4,6 +4,7 @@
 //! Densities and estimators come from [`lanesweep_stats`]; lanes run in [`lanesweep_engine`].
 
 mod against_recorded;
+mod bandwidth;
 mod cheaper_estimator;
 mod crude;
 mod estimate_rows;
@@ -20,6 +21,7 @@ mod uncertainty;
 mod weighted;
 
 pub use against_recorded::TRAFFIC_DRAWS;
+pub use bandwidth::AtBandwidth;
 pub use cheaper_estimator::Choice;
 pub use crude::{Checkpoint, CheckpointRow, CrudeRun};
 pub use estimate_rows::{EstimateRow, NoTraffic, RecordedRatios, Risk, RiskRate};

@@ -59,7 +59,29 @@ pub struct Bandwidth {
     pub silverman: f64,
     /// Position of the maximum found.
     pub end: SearchEnd,
+    /// What the likelihood says without the rule; none in files of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub likelihood: Option<BandwidthLikelihood>,
 }
+
+/// The leave-one-out likelihood over bandwidths from 0.05 to 5 times Silverman's.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BandwidthLikelihood {
+    /// Its maximum, in units of the scales.
+    pub best: f64,
+    /// Lower end of its 95 % interval: ln of the likelihood is 1.92 below the maximum, or the range ends.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+/// Range of bandwidths, in units of Silverman's.
+const LIKELIHOOD_RANGE: [f64; 2] = [0.05, 5.0];
+/// Half the 95 % quantile of χ² with one degree of freedom.
+const LIKELIHOOD_DROP: f64 = 1.920_729_410_347_062;
+/// Width of the brackets of maximum and ends, in ln.
+const LN_TOLERANCE: f64 = 1e-3;
 
 /// Width of the bracket at which the search ends.
 const TOLERANCE: f64 = 1e-5;
@@ -119,32 +141,57 @@ impl LeaveOneOut {
         (0..n).into_par_iter().map_init(Vec::new, of_row).collect()
     }
 
-    /// The best bandwidth in the rule's interval.
-    pub(super) fn search(&self, rule: BandwidthRule) -> Bandwidth {
-        let n = self.nearest.len();
-        let [lower, upper] = rule.interval(n, self.columns.len());
+    /// The position of the maximum of a function in an interval, as the last bracket of a golden-section search.
+    fn maximum(of: impl Fn(f64) -> f64, [lower, upper]: [f64; 2], tolerance: f64) -> [f64; 2] {
         let inverse_golden = (5.0_f64.sqrt() - 1.0) / 2.0;
         let (mut a, mut b) = (lower, upper);
         let mut left = b - inverse_golden * (b - a);
         let mut right = a + inverse_golden * (b - a);
-        let (mut at_left, mut at_right) = (self.log_likelihood(left), self.log_likelihood(right));
-        while b - a > TOLERANCE {
+        let (mut at_left, mut at_right) = (of(left), of(right));
+        while b - a > tolerance {
             if at_left >= at_right {
                 (b, right, at_right) = (right, left, at_left);
                 left = b - inverse_golden * (b - a);
-                at_left = self.log_likelihood(left);
+                at_left = of(left);
             } else {
                 (a, left, at_left) = (left, right, at_right);
                 right = a + inverse_golden * (b - a);
-                at_right = self.log_likelihood(right);
+                at_right = of(right);
             }
         }
+        [a, b]
+    }
+
+    /// The likelihood's own maximum and interval. A maximum at an end of the range (of doubled points, for instance) is told as it is.
+    fn likelihood(&self, silverman: f64) -> BandwidthLikelihood {
+        let of_ln = |ln_h: f64| self.log_likelihood(libm::exp(ln_h));
+        let range = LIKELIHOOD_RANGE.map(|times| libm::log(times * silverman));
+        let [a, b] = LeaveOneOut::maximum(of_ln, range, LN_TOLERANCE);
+        let best = 0.5 * (a + b);
+        let limit = of_ln(best) - LIKELIHOOD_DROP;
+        let end = |mut outer: f64| {
+            let mut inner = if of_ln(outer) < limit { best } else { outer };
+            while (outer - inner).abs() > LN_TOLERANCE {
+                let middle = 0.5 * (inner + outer);
+                if of_ln(middle) < limit { outer = middle } else { inner = middle }
+            }
+            libm::exp(outer)
+        };
+        BandwidthLikelihood { best: libm::exp(best), low: end(range[0]), high: end(range[1]) }
+    }
+
+    /// The best bandwidth in the rule's interval.
+    pub(super) fn search(&self, rule: BandwidthRule) -> Bandwidth {
+        let (n, d) = (self.nearest.len(), self.columns.len());
+        let [lower, upper] = rule.interval(n, d);
+        let [a, b] = LeaveOneOut::maximum(|h| self.log_likelihood(h), [lower, upper], TOLERANCE);
         let end = match (a == lower, b == upper) {
             (true, false) => SearchEnd::Lower,
             (false, true) => SearchEnd::Upper,
             _ => SearchEnd::Inside,
         };
-        Bandwidth { value: 0.5 * (a + b), rule, silverman: silverman(n, self.columns.len()), end }
+        let silverman = silverman(n, d);
+        Bandwidth { value: 0.5 * (a + b), rule, silverman, end, likelihood: Some(self.likelihood(silverman)) }
     }
 }
 

@@ -74,6 +74,15 @@ impl Kde {
         Ok(Kde { points, scale, bandwidth })
     }
 
+    /// The same kernels with another bandwidth, in units of the scales.
+    ///
+    /// # Errors
+    /// As [`Kde::from_parts`].
+    pub fn at_bandwidth(&self, value: f64) -> Result<Kde> {
+        let bandwidth = Bandwidth { value, likelihood: None, ..self.bandwidth };
+        Kde::from_parts(self.points.clone(), self.scale.clone(), bandwidth)
+    }
+
     /// Kernel centres.
     pub fn points(&self) -> &[Vec<f64>] {
         &self.points

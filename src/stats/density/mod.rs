@@ -18,7 +18,7 @@ mod parameters;
 mod rosenblatt;
 mod valid;
 
-pub use bandwidth::{Bandwidth, BandwidthRule, LeaveOneOut, SearchEnd};
+pub use bandwidth::{Bandwidth, BandwidthLikelihood, BandwidthRule, LeaveOneOut, SearchEnd};
 pub use kde::Kde;
 pub use mixture::Mixture;
 pub use model::{DensityModel, Exposure, FitOptions, Fitted, Provenance, Rate};

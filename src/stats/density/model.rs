@@ -192,6 +192,26 @@ impl DensityModel {
         Ok(Fitted { model, left_out })
     }
 
+    /// The density with another bandwidth, in units of the scales, without its scenarios.
+    ///
+    /// # Errors
+    /// As [`Kde::from_parts`] and [`ValidFraction::count`].
+    pub fn at_bandwidth(&self, value: f64) -> Result<DensityModel> {
+        let kde = self.kde.at_bandwidth(value)?;
+        let valid = ValidFraction::count(&kde, &self.space, VALID_FRACTION_DRAWS, self.valid.seed)?;
+        let (space, exposure, provenance) = (self.space.clone(), self.exposure, self.provenance.clone());
+        Ok(DensityModel {
+            space,
+            kde,
+            valid,
+            sizes: self.sizes,
+            exposure,
+            earlier: None,
+            provenance,
+            scenarios: vec![],
+        })
+    }
+
     /// Kind of scenario.
     pub fn category(&self) -> Category {
         self.space.id().category

@@ -40,6 +40,13 @@ pub enum Warning {
         /// The interval excludes 1.
         is_decided: bool,
     },
+    /// The 95 % interval of the bandwidth changes the probability beyond chance and by more than a quarter.
+    BandwidthDecides {
+        /// P at its lower end.
+        narrow: f64,
+        /// P at its upper end.
+        wide: f64,
+    },
     /// Effective sample size over the failures below `Warning::MIN_EFFECTIVE_SIZE`: the variance itself is
     /// badly known.
     LowEffectiveSize {
@@ -105,6 +112,7 @@ impl Warning {
         match self {
             Warning::FewScenarios { .. } | Warning::DataLeftOut => Uncertain::Data,
             Warning::NotCompared | Warning::AgainstRecorded { .. } => Uncertain::Density,
+            Warning::BandwidthDecides { .. } => Uncertain::Bandwidth,
             _ => Uncertain::Draws,
         }
     }
@@ -142,6 +150,12 @@ impl fmt::Display for Warning {
                     ),
                 }
             }
+            Warning::BandwidthDecides { narrow, wide } => write!(
+                f,
+                "the bandwidth decides: P is {} to {} over its 95 % interval",
+                significant(*narrow, 2),
+                significant(*wide, 2)
+            ),
             Warning::LowEffectiveSize { effective_size } => {
                 write!(f, "the failures count as no more than {effective_size:.1} equally weighted ones")
             }
@@ -173,6 +187,8 @@ enum Uncertain {
     Draws,
     /// The density, and the parameterization below it, in place of traffic.
     Density,
+    /// The width of its kernels, which no interval holds.
+    Bandwidth,
     /// The recorded scenarios in place of all.
     Data,
 }
@@ -246,6 +262,7 @@ impl Trust {
         let whose = match (few, self.density()) {
             _ if self.draws() == Verdict::Unusable => return "nothing: too much missed".to_owned(),
             _ if self.data() == "none" => return "upper bound only".to_owned(),
+            _ if self.of(Uncertain::Bandwidth).next().is_some() => "bandwidth decides".to_owned(),
             (Some(scenarios), _) if scenarios < 2.0 => "carried by one scenario".to_owned(),
             (Some(scenarios), _) => format!("carried by {:.0} scenarios", scenarios.floor()),
             (None, "agrees") => "recordings' rate".to_owned(),
@@ -308,6 +325,11 @@ mod tests {
         let few = of(vec![Warning::FewScenarios { scenarios: 2.0 }, Warning::NotCompared]);
         assert_eq!((few.draws(), few.density(), few.data()), (Verdict::Sound, "open", "few"));
         assert_eq!(few.usable(), "carried by 2 scenarios");
+        let wide = of(vec![Warning::BandwidthDecides { narrow: 1e-5, wide: 1e-3 }, Warning::NotCompared]);
+        assert_eq!(
+            (wide.draws(), wide.density(), wide.usable()),
+            (Verdict::Sound, "open", "bandwidth decides".to_owned())
+        );
         assert_eq!(of(vec![Warning::FewFailures { failures: 3 }]).draws(), Verdict::Doubtful);
         assert_eq!(of(vec![Warning::OneWeightDominates { share: 0.3 }]).draws(), Verdict::Doubtful);
         assert_eq!(

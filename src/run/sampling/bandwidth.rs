@@ -1,0 +1,97 @@
+//! The same probabilities at other bandwidths of the density: at both ends of the 95 % interval of its leave-one-out
+//! likelihood. No interval of an estimate holds the bandwidth. Lanes are the CPU's, so that a merge has the same ones.
+
+use serde::Serialize;
+
+use super::limit_state::{LaneLimitState, truncated};
+use super::result::SampleResult;
+use super::sample_options::SampleOptions;
+use super::{Sample, SampleKind, Weighted};
+use lanesweep_engine::{CpuBackend, Executor};
+use lanesweep_stats::density::DensityModel;
+use lanesweep_stats::estimate::{Importance, StopRule, Warning, from_weight_sums, importance_sums};
+use lanesweep_support::Result;
+
+/// Maximum number of draws of the density, and of the proposal, at each end.
+const DRAWS: u64 = 20_000;
+/// Maximum number of lanes of the density beside the draws of a proposal.
+const BESIDE_LANES: u64 = 1 << 20;
+/// Lanes of a driver outside the registry are thousands of times as slow, so that they are fewer.
+const FEWER: u64 = 16;
+/// Probabilities within this factor of one another agree, as in the comparison with recorded scenarios.
+const AGREE: f64 = 1.25;
+
+/// A probability at another bandwidth, with the interval of its draws.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct AtBandwidth {
+    /// The bandwidth over that of the density.
+    pub factor: f64,
+    /// P.
+    pub probability: f64,
+    /// Lower end of the interval of the draws.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+impl AtBandwidth {
+    /// Whether it is another probability than the one with this interval of its draws.
+    fn is_other(&self, probability: f64, [low, high]: [f64; 2]) -> bool {
+        let factor = self.probability / probability;
+        (self.low > high || self.high < low) && !(1.0 / AGREE..=AGREE).contains(&factor)
+    }
+}
+
+impl Sample {
+    /// Adds to every row its probability at both ends. Densities of files of earlier versions know none.
+    ///
+    /// # Errors
+    /// Those of the lanes.
+    pub(super) fn at_bandwidths(&self, mut result: SampleResult) -> Result<SampleResult> {
+        let Some(likelihood) = self.density.kde.bandwidth().likelihood else { return Ok(result) };
+        let is_slow = self.options.models.iter().any(|model| model.foreign().is_some());
+        let share = if is_slow { FEWER } else { 1 };
+        for (end, value) in [likelihood.low, likelihood.high].into_iter().enumerate() {
+            let density = self.density.at_bandwidth(value)?;
+            let factor = value / self.density.kde.bandwidth().value;
+            let found = match &self.kind {
+                SampleKind::Crude(_) => self.crude_at(density, DRAWS / share)?,
+                SampleKind::Weighted(weighted) => self.weighted_at(&density, weighted, share)?,
+                SampleKind::Search(_) => return Ok(result),
+            };
+            for (row, (probability, [low, high])) in result.rows.iter_mut().zip(found) {
+                row.at_bandwidths[end] = Some(AtBandwidth { factor, probability, low, high });
+            }
+        }
+        for row in &mut result.rows {
+            let [Some(narrow), Some(wide)] = row.at_bandwidths else { continue };
+            let decides = [narrow, wide].iter().any(|of| of.is_other(row.estimate.probability, row.draws));
+            let warning = Warning::BandwidthDecides { narrow: narrow.probability, wide: wide.probability };
+            row.estimate.trust.warn_if(decides, warning);
+        }
+        Ok(result)
+    }
+
+    /// Estimates of crude Monte Carlo with another density, in the order of the rows, with the intervals of the draws.
+    fn crude_at(&self, density: DensityModel, draws: u64) -> Result<Vec<(f64, [f64; 2])>> {
+        let draws = draws.min(self.options.stop.samples);
+        let options = SampleOptions { stop: StopRule::samples(draws), ..self.options.clone() };
+        let cpu = CpuBackend::lane_arithmetic();
+        // It knows no likelihood, so that it asks for no further bandwidths.
+        let rows = Sample::plan(density, &self.profile, &options)?.run(&Executor::new(&cpu))?.rows;
+        Ok(rows.iter().map(|row| (row.estimate.probability, row.draws)).collect())
+    }
+
+    /// The same of importance sampling: the proposal is that of the run.
+    fn weighted_at(&self, density: &DensityModel, of: &Weighted, share: u64) -> Result<Vec<(f64, [f64; 2])>> {
+        let draws = of.draws.draws.min(DRAWS / share);
+        let crude = (of.draws.draws * of.draws.crude_per_draw).min(BESIDE_LANES / share / self.lanes_per_sample());
+        let options = Importance { seed: of.draws.seed, draws, crude_per_draw: (crude / draws).max(1) };
+        let (nominal, asked, cpu) = (truncated(density)?, self.options.asked(), CpuBackend::lane_arithmetic());
+        let executor = Executor::new(&cpu);
+        let lanes = LaneLimitState::new(density, &self.profile, &self.options.headways, &asked, executor);
+        let sums = importance_sums(&nominal, &of.proposal, &lanes, &options, 0..draws)?;
+        let estimates = sums.iter().map(|of| from_weight_sums(&of.total().unwrap_or_default(), self.options.level));
+        Ok(estimates.map(|of| (of.probability, [of.interval.low, of.interval.high])).collect())
+    }
+}
