@@ -40,7 +40,7 @@ fn main() {
 
 fn sampling(folder: &Path) {
     let samples = 2_000_000;
-    let options = SampleOptions::new(Estimator::CRUDE, samples, SampleHeadways::Each(vec![Headway::ThwS(1.0)]));
+    let options = SampleOptions::new(Estimator::Crude, samples, SampleHeadways::Each(vec![Headway::ThwS(1.0)]));
     let sample = Sample::plan(density(), &Profile::load("paper").unwrap(), &options).unwrap();
     let SampleJob::Crude(job) = sample.job().unwrap() else { unreachable!("crude Monte Carlo") };
     let backend = CpuBackend::lane_arithmetic();

@@ -50,7 +50,7 @@ fn main() {
 fn run(part: &str, density: &DensityModel, models: &[ModelId], samples: u64) {
     let options = SampleOptions {
         models: models.to_vec(),
-        ..SampleOptions::new(Estimator::CRUDE, samples, SampleHeadways::Each(vec![Headway::ThwS(1.0)]))
+        ..SampleOptions::new(Estimator::Crude, samples, SampleHeadways::Each(vec![Headway::ThwS(1.0)]))
     };
     let profile = Profile::load("paper").unwrap();
     let sample = Sample::plan(density.clone(), &profile, &options).unwrap();

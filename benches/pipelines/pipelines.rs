@@ -124,7 +124,7 @@ fn sampled_plans(samples: u64) -> Vec<(Parameterization, LanePlan)> {
     let plan = |(category, key)| {
         let density = density(category, key, &scenarios);
         let headways = SampleHeadways::Each(vec![Headway::ThwS(1.0)]);
-        let options = SampleOptions::new(Estimator::CRUDE, samples, headways);
+        let options = SampleOptions::new(Estimator::Crude, samples, headways);
         let profile = Profile::load("paper").expect("a profile");
         (*density.space.id(), plan_samples(&density, &profile, &options).expect("a plan"))
     };

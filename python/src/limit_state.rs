@@ -11,7 +11,7 @@ use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{LaneLimitState, Question, SAMPLE_PURPOSE, SampleHeadways, truncated};
 use lanesweep::stats::density::{DensityModel, read_density};
 use lanesweep::stats::estimate::{
-    BinomialInterval, Counts, Density as _, LimitState as _, StopReason, Warning, from_counts, importance_of_points,
+    Counts, Density as _, LimitState as _, StopReason, Warning, from_counts, importance_of_points,
 };
 use lanesweep::stats::random::Stream;
 use lanesweep::{Error, Place, Result};
@@ -249,7 +249,7 @@ impl LimitState {
                 None => {
                     let failures = fails.iter().filter(|fails| **fails).count() as u64;
                     let counts = Counts { runs: valid, failures, voids: 0, tries: points.len() as u64 };
-                    let mut estimate = from_counts(&counts, BinomialInterval::Wilson, level, StopReason::Samples);
+                    let mut estimate = from_counts(&counts, level, StopReason::Samples);
                     estimate.trust.warnings.push(Warning::DataLeftOut);
                     estimate
                 }

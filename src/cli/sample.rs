@@ -53,11 +53,9 @@ pub(crate) struct Sample {
     /// The first 1000, or sample.failures_limit; with the columns of --rows. For a run in parts: `merge --failures`.
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub(super) failures: Option<PathBuf>,
-    /// Proposal file to sample, with --estimator is; repeatable
-    ///
-    /// Several are mixed with equal weights.
+    /// Proposal file to sample, with --estimator is
     #[arg(long, value_name = "FILE", help_heading = "Data")]
-    pub(super) proposal: Vec<PathBuf>,
+    pub(super) proposal: Option<PathBuf>,
     /// Folder for estimate.json, tables and figures
     #[arg(long, value_name = "DIR", default_value = "lanesweep-sample", help_heading = "Output")]
     pub(super) out: PathBuf,
@@ -74,7 +72,7 @@ pub(crate) struct Sample {
 
 impl Sample {
     pub(super) fn is_crude(&self) -> bool {
-        self.settings.estimator != EstimatorKind::Is && self.proposal.is_empty()
+        self.settings.estimator != EstimatorKind::Is && self.proposal.is_none()
     }
 
     /// Whether importance sampling answers what crude Monte Carlo would answer at a higher cost.

@@ -4,14 +4,12 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use super::sample::Sample;
-use crate::settings::{EstimatorKind, IntervalKind};
+use crate::settings::EstimatorKind;
 use lanesweep_model::driver::ModelId;
 use lanesweep_report::lanes::table_format;
 use lanesweep_run::sampling::{Estimator, SampleHeadways, SampleOptions, read_proposal};
-use lanesweep_stats::density::{DensityModel, Mixture};
-use lanesweep_stats::estimate::{BinomialInterval, Goal, Search, StopRule};
-use lanesweep_support::input_file::canonical;
-use lanesweep_support::ranges::refuse_repeats;
+use lanesweep_stats::density::DensityModel;
+use lanesweep_stats::estimate::{Goal, Search, StopRule};
 use lanesweep_support::{Error, Place, Result, option};
 
 impl Sample {
@@ -34,7 +32,7 @@ impl Sample {
     /// All options of a run over a density.
     pub(super) fn options(&self, density: &DensityModel) -> Result<SampleOptions> {
         let samples = self.settings.samples.unwrap_or(match self.settings.estimator {
-            EstimatorKind::Is if self.proposal.is_empty() => MAX_DRAWS,
+            EstimatorKind::Is if self.proposal.is_none() => MAX_DRAWS,
             _ => DEFAULT_SAMPLES,
         });
         let headways = self.headways(density)?;
@@ -63,31 +61,17 @@ impl Sample {
     fn estimator(&self, density: &DensityModel) -> Result<Estimator> {
         let settings = &self.settings;
         Ok(match settings.estimator {
-            EstimatorKind::Auto | EstimatorKind::Mc => Estimator::Crude { interval: self.interval() },
-            EstimatorKind::Is if self.proposal.is_empty() => {
-                Estimator::Search(self.search(&self.models()?, &self.headways(density)?))
-            }
+            EstimatorKind::Auto | EstimatorKind::Mc => Estimator::Crude,
             EstimatorKind::Is => {
-                let read = |path: &PathBuf| read_proposal(path, density);
-                let proposals: Vec<Mixture> = self.proposal.iter().map(read).collect::<Result<_>>()?;
-                let share = 1.0 / proposals.len() as f64;
-                let equal: Vec<(f64, &Mixture)> = proposals.iter().map(|proposal| (share, proposal)).collect();
-                let draws = settings.samples.unwrap_or(DEFAULT_SAMPLES);
-                let crude = self.search(&self.models()?, &self.headways(density)?).crude / draws.max(1);
+                let search = self.search(&self.models()?, &self.headways(density)?);
+                let Some(proposal) = &self.proposal else { return Ok(Estimator::Search(search)) };
+                let crude = search.crude / settings.samples.unwrap_or(DEFAULT_SAMPLES).max(1);
                 Estimator::Given {
-                    proposal: Some(Mixture::join(&equal)?),
+                    proposal: Some(read_proposal(proposal, density)?),
                     crude_per_draw: crude.clamp(1, CRUDE_PER_DRAW),
                 }
             }
         })
-    }
-
-    /// Type of the interval of crude Monte Carlo.
-    pub(super) fn interval(&self) -> BinomialInterval {
-        match self.settings.interval {
-            IntervalKind::Wilson => BinomialInterval::Wilson,
-            IntervalKind::ClopperPearson => BinomialInterval::ClopperPearson,
-        }
     }
 }
 
@@ -135,12 +119,11 @@ impl Sample {
                 format!("leave out the stop rules, or {}", option("shard")),
             ));
         }
-        if !self.proposal.is_empty() && settings.estimator != EstimatorKind::Is {
+        if self.proposal.is_some() && settings.estimator != EstimatorKind::Is {
             let problem = "a given proposal is sampled by importance sampling";
             return Err(Error::usage(Place::option("proposal"), problem, format!("add {}", option("estimator = is"))));
         }
-        let proposals = self.proposal.iter().map(|path| (canonical(path), path.display()));
-        refuse_repeats(|| Place::option("proposal"), proposals)
+        Ok(())
     }
 }
 

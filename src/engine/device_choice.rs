@@ -158,7 +158,7 @@ mod tests {
     fn a_backend_is_one_of_three_words() {
         let parsed = ["auto", "cpu", "gpu"].map(|word| word.parse::<BackendChoice>().unwrap());
         assert_eq!(parsed, [BackendChoice::Auto, BackendChoice::Cpu, BackendChoice::Gpu]);
-        assert!("cuda".parse::<BackendChoice>().unwrap_err().help().unwrap().contains("auto, cpu or gpu"));
+        assert!("cuda".parse::<BackendChoice>().unwrap_err().help().unwrap().contains("auto, cpu, gpu"));
     }
 
     #[test]

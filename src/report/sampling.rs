@@ -263,6 +263,19 @@ impl SampleReport {
             .column("THW", |row| row.headway.as_str())
     }
 
+    /// P at both ends of the bandwidth's interval, for the told rows that have it.
+    pub(super) fn bandwidths(&self) -> Table {
+        let told = self.estimates.iter().filter(|row| row.is_told(&self.estimates) && row.at_bandwidths[0].is_some());
+        let ends = [("narrow", 0), ("wide", 1)];
+        self.named(told)
+            .columns(
+                ends,
+                |(name, _)| three_digits(name),
+                |row, (_, end)| row.at_bandwidths[end].map(|of| of.probability),
+            )
+            .build()
+    }
+
     /// What the importance weights indicate, for those estimates that have them.
     pub(super) fn weights(&self) -> Table {
         let percent = |name| Column::from(name).digits(Digits::Fixed(2));

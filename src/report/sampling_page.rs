@@ -70,6 +70,10 @@ impl SampleReport {
             value(100.0 * self.level()),
             self.interval_rule()
         ))];
+        let bandwidths = self.bandwidths();
+        if !bandwidths.rows.is_empty() {
+            tables.push(bandwidths.captioned("P at the ends of the 95 % interval of the bandwidth"));
+        }
         let weights = self.weights();
         if !weights.rows.is_empty() {
             tables.push(weights.captioned("Weights: how much of the sample counts"));

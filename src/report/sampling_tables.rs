@@ -174,18 +174,22 @@ impl SampleReport {
         let told = || self.estimates.iter().filter(|row| row.is_told(&self.estimates));
         let [Some(narrow), Some(wide)] = told().next()?.at_bandwidths else { return None };
         let [narrow, wide] = [narrow, wide].map(|of| significant(of.factor, 2));
-        let all = told().count();
-        let deciding = told().filter(|row| {
-            row.estimate.trust.warnings.iter().any(|warning| matches!(warning, Warning::BandwidthDecides { .. }))
-        });
-        Some(match deciding.count() {
+        let changes = |row: &EstimateRow| {
+            let is_of = |warning: &&Warning| matches!(warning, Warning::BandwidthDecides { .. });
+            row.estimate.trust.warnings.iter().find(is_of)?;
+            let factors = row.at_bandwidths.iter().flatten().map(|of| of.probability / row.estimate.probability);
+            Some(factors.map(|factor| factor.max(1.0 / factor)).filter(|of| of.is_finite()).fold(1.0, f64::max))
+        };
+        let changes: Vec<f64> = told().filter_map(changes).collect();
+        let (all, most) = (told().count(), significant(changes.iter().copied().fold(1.0, f64::max), 2));
+        Some(match changes.len() {
             0 => format!(
                 "The bandwidth decides no row: at {narrow} and {wide} times the density's, the ends of its 95 % interval, P stays \
                  within a quarter or chance"
             ),
             rows => format!(
                 "The bandwidth decides {rows} of {all} rows: at {narrow} and {wide} times the density's, the ends of its 95 % interval, \
-                 P differs by more than a quarter and chance (`probability_narrow`, `probability_wide` in estimates.csv)"
+                 P changes by up to {most} times (`probability_narrow`, `probability_wide` in estimates.csv)"
             ),
         })
     }

@@ -41,7 +41,7 @@ fn a_device_counts_what_the_host_counts() {
     ] {
         let density = density(category, key, with_thw);
         let headways = if with_thw { SampleHeadways::Sampled } else { each() };
-        let options = SampleOptions::new(Estimator::CRUDE, n, headways);
+        let options = SampleOptions::new(Estimator::Crude, n, headways);
         let expected = tally(&density, &options, &cpu, None).unwrap();
         assert!(expected.failures.iter().sum::<u64>() > 0 && expected.by_kernel.is_some(), "{key}");
         for chunk_lanes in [None, Some(4_000)] {
@@ -55,7 +55,7 @@ fn a_device_counts_what_the_host_counts() {
 fn a_wrong_count_stops_the_run() {
     let density = density(Category::CutIn, "2", false);
     let headways = SampleHeadways::Each([0.5, 1.0].map(Headway::ThwS).to_vec());
-    let options = SampleOptions::new(Estimator::CRUDE, 1500, headways);
+    let options = SampleOptions::new(Estimator::Crude, 1500, headways);
     for (from, to) in [
         ("failed * failed", "failed + failed"),
         ("point.component % tally_groups", "(point.component + 1u) % tally_groups"),

@@ -23,7 +23,7 @@ fn density(category: Category, key: &str, with_thw: bool) -> DensityModel {
 
 fn options(samples: u64) -> SampleOptions {
     let headways = SampleHeadways::Each(vec![Headway::ThwS(1.4), Headway::ThwS(0.4)]);
-    SampleOptions { seed: 2026, ..SampleOptions::new(Estimator::CRUDE, samples, headways) }
+    SampleOptions { seed: 2026, ..SampleOptions::new(Estimator::Crude, samples, headways) }
 }
 
 fn outcomes(plan: &LanePlan, backend: &dyn Backend, cuts: &[u64]) -> Vec<[u64; 17]> {

@@ -51,7 +51,7 @@ fn is_sound(row: &EstimateRow) -> bool {
 fn rates_that_are_sound_do_not_exclude_each_other() {
     let mut sound: Vec<(String, EstimateRow)> = Vec::new();
     for key in ["1", "2", "3", "4", "6", "7"] {
-        let rows = rows(&sample(density(key), Estimator::CRUDE, Headway::paper()));
+        let rows = rows(&sample(density(key), Estimator::Crude, Headway::paper()));
         for row in overall(&rows) {
             let ratios = row.recorded.unwrap();
             let agrees = ratios.replayed.agrees() && ratios.sampled.unwrap().agrees();
@@ -80,7 +80,7 @@ fn rates_that_are_sound_do_not_exclude_each_other() {
 fn a_rate_that_nothing_is_compared_with_is_not_sound() {
     let mut without = density("2");
     without.scenarios.clear();
-    for row in rows(&sample(without, Estimator::CRUDE, Headway::paper())) {
+    for row in rows(&sample(without, Estimator::Crude, Headway::paper())) {
         assert!(row.recorded.is_none() && !is_sound(&row), "{row:?}");
         assert!(row.estimate.trust.warnings.contains(&Warning::NotCompared));
     }
@@ -109,7 +109,7 @@ fn a_density_file_holds_its_scenarios_and_refuses_others() {
 /// A density that draws its headway is compared with S from its recorded gaps; under a condition nothing is compared.
 #[test]
 fn no_rate_is_sound_that_is_compared_with_nothing() {
-    let mut options = SampleOptions::new(Estimator::CRUDE, 4000, SampleHeadways::Sampled);
+    let mut options = SampleOptions::new(Estimator::Crude, 4000, SampleHeadways::Sampled);
     options.models = vec![ModelId::Cchdm, ModelId::Fsm];
     let profile = Profile::load("paper").unwrap();
     let drawn = rows(&Sample::plan(density_of("2", true), &profile, &options).unwrap());

@@ -114,7 +114,7 @@ fn sampled_lanes_are_the_runs_lanes_too() {
     for (category, key) in [(Category::CutIn, "2"), (Category::CutOut, "b"), (Category::Lvd, "iv")] {
         let density = fitted(scenarios(), category, key, false);
         let headways = SampleHeadways::Each(vec![Headway::ThwS(1.4), Headway::ThwS(0.4)]);
-        let options = SampleOptions { seed: 3, ..SampleOptions::new(Estimator::CRUDE, 5000, headways) };
+        let options = SampleOptions { seed: 3, ..SampleOptions::new(Estimator::Crude, 5000, headways) };
         let plan = plan_samples(&density, &profile, &options).unwrap();
         let outcomes = CpuBackend::lane_arithmetic().prepare(&plan).unwrap();
         let outcomes = { outcomes }.run(0..plan.unit_count(), Wanted::Outcomes).unwrap().outcomes;

@@ -7,12 +7,14 @@ use crate::common::{self, program};
 
 use std::path::Path;
 
-use lanesweep::engine::{Backend, CpuBackend, Headway, LanePlan, SampleTally, Wanted};
-use lanesweep::model::driver::MODELS;
+use lanesweep::engine::{Backend, CpuBackend, Executor, Headway, LanePlan, SampleTally, Wanted};
+use lanesweep::model::criterion::Criterion;
+use lanesweep::model::driver::{MODELS, ModelId};
 use lanesweep::model::profile::Profile;
-use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, plan_samples};
+use lanesweep::run::sampling::{Estimator, Sample, SampleHeadways, SampleOptions, plan_samples};
 use lanesweep::scenario::{Category, Driven};
 use lanesweep::stats::density::{DensityModel, Exposure, Kde, read_density, write_density};
+use lanesweep::stats::estimate::Search;
 
 fn density(category: Category, key: &str) -> DensityModel {
     fitted(scenarios(), category, key, false)
@@ -27,7 +29,7 @@ fn folder() -> tempfile::TempDir {
 
 fn options_of(samples: u64) -> SampleOptions {
     let headways = SampleHeadways::Each(vec![Headway::ThwS(1.0), Headway::ThwS(0.4)]);
-    SampleOptions { seed: 5, ..SampleOptions::new(Estimator::CRUDE, samples, headways) }
+    SampleOptions { seed: 5, ..SampleOptions::new(Estimator::Crude, samples, headways) }
 }
 
 fn plan(density: &DensityModel, samples: u64, profile: &Profile) -> LanePlan {
@@ -235,6 +237,41 @@ fn auto_answers_frequent_failures_by_crude_lanes_and_rare_ones_by_importance_sam
         estimators.push(cell[2]);
     }
     assert_eq!(estimators, ["mc", "is"]);
+}
+
+#[test]
+fn p_at_both_ends_of_the_bandwidths_interval_is_that_of_the_density_there_by_either_estimator() {
+    let (profile, cpu) = (Profile::load("paper").unwrap(), CpuBackend::lane_arithmetic());
+    let row = |density: DensityModel, estimator, samples| {
+        let headways = SampleHeadways::Each(vec![Headway::ThwS(1.2)]);
+        let options = SampleOptions { models: vec![ModelId::Fsm], ..SampleOptions::new(estimator, samples, headways) };
+        let rows = Sample::plan(density, &profile, &options).unwrap().run(&Executor::new(&cpu)).unwrap().rows;
+        rows.into_iter().find(|row| row.criterion == Criterion::Collision).unwrap()
+    };
+    let density = density(Category::CutIn, "3");
+    let likelihood = density.kde.bandwidth().likelihood.unwrap();
+    let search = Estimator::Search(Search { crude: 1 << 20, ..Search::default() });
+    let rows = [row(density.clone(), Estimator::Crude, 200_000), row(density.clone(), search, 10_000)];
+    for (end, value) in [likelihood.low, likelihood.high].into_iter().enumerate() {
+        let direct = row(density.at_bandwidth(value).unwrap(), Estimator::Crude, 1_000_000);
+        assert_eq!(direct.at_bandwidths, [None; 2]);
+        for row in &rows {
+            let at = row.at_bandwidths[end].unwrap();
+            assert!(at.low < direct.draws[1] && at.high > direct.draws[0], "{at:?} {direct:?}");
+            assert!((at.factor * density.kde.bandwidth().value / value - 1.0).abs() < 1e-12, "{at:?}");
+        }
+    }
+    // The kernels' tails make these failures.
+    for row in rows {
+        assert_eq!(row.estimate.trust.usable(), "bandwidth decides", "{row:?}");
+    }
+    // Where most lanes fail, they do so at any bandwidth.
+    let dir = folder();
+    let said = ran(dir.path(), "-q sample density.json --thw 0.2 --models Reg157 --samples 3000 --backend cpu");
+    assert!(said.contains("The bandwidth decides no row"), "{said}");
+    for row in table(&dir.path().join("lanesweep-sample/estimates.csv")) {
+        assert!(["probability_narrow", "probability_wide"].iter().all(|column| !row[*column].is_empty()), "{row:?}");
+    }
 }
 
 /// The density over the first scenarios only, scale and bandwidth held.

@@ -77,10 +77,18 @@ fn scale_bandwidth_density_and_probabilities_are_those_of_the_published_program(
         let narrow = Kde::fit(data.clone(), &names(d), BandwidthRule::Reduction).unwrap();
         assert_near(narrow.bandwidth().value, number(&case["bandwidth_maxbw_silverman"]), 2e-5, "bounded bandwidth");
         assert_eq!(narrow.bandwidth().end, SearchEnd::Upper);
+        // The likelihood knows no rule, and its interval ends where twice its fall is the quantile of χ².
+        assert_eq!(narrow.bandwidth().likelihood, wide.bandwidth().likelihood);
+        let likelihood = wide.bandwidth().likelihood.unwrap();
+        assert_near(likelihood.best, wide.bandwidth().value, 2e-3, "maximum of the likelihood");
 
         let scaled: Vec<Vec<f64>> =
             data.iter().map(|p| p.iter().zip(wide.scale()).map(|(v, s)| v / s).collect()).collect();
         let scores = LeaveOneOut::new(&scaled);
+        for end in [likelihood.low, likelihood.high] {
+            let fall = scores.log_likelihood(likelihood.best) - scores.log_likelihood(end);
+            assert!((2.0 * fall - 3.841).abs() < 0.1, "{end}: {fall}");
+        }
         let logs: f64 = wide.scale().iter().map(|s| s.ln()).sum();
         for score in case["loo_scores"].as_array().unwrap() {
             // At narrow bandwidths the program lets distant kernels underflow; its search does not go there.

@@ -8,8 +8,8 @@ use lanesweep::engine::Confusion;
 use lanesweep::run::score::{ScoreOptions, f1, f1_interval};
 use lanesweep::stats::density::{Mixture, normal_quantile};
 use lanesweep::stats::estimate::{
-    BinomialInterval, Clusters, Counts, Density, Estimate, Goal, LimitState, Search, StopReason, StopRule, Truncated,
-    Verdict, cluster_rate, from_counts,
+    Clusters, Counts, Density, Estimate, Goal, LimitState, Search, StopReason, StopRule, Truncated, Verdict,
+    cluster_rate, from_counts,
 };
 use lanesweep::stats::random::Stream;
 use rand_chacha::ChaCha8Rng;
@@ -99,24 +99,15 @@ fn binomial_intervals_hold() {
     let mut misses = Misses::default();
     for (beta, dimensions, samples) in [(2.0, 2, 440), (2.0, 10, 2200), (2.5, 5, 3000), (3.0, 2, 20_000)] {
         let density = StandardNormal { dimensions };
-        for (interval, name) in
-            [(BinomialInterval::Wilson, "Wilson"), (BinomialInterval::ClopperPearson, "Clopper-Pearson")]
-        {
-            let row = repeat(&format!("{name}, linear {beta}, d = {dimensions}"), tail(beta), REPEATS, |seed| {
-                let stream = Stream { seed, purpose: 0 };
-                let points: Vec<Vec<f64>> = (0..samples).map(|index| density.attempt(&stream, index, 0)).collect();
-                let values = linear(beta).evaluate(&points).expect("values");
-                let failures = values.iter().filter(|value| **value <= 0.0).count() as u64;
-                let counts = Counts { runs: samples, failures, voids: 0, tries: samples };
-                from_counts(&counts, interval, 0.95, StopReason::Samples)
-            });
-            match interval {
-                BinomialInterval::Wilson => {
-                    misses.want((0.93..=0.97).contains(&row.coverage), &row, "93-97 %");
-                }
-                BinomialInterval::ClopperPearson => misses.want(row.coverage >= 0.95, &row, "95 %"),
-            }
-        }
+        let row = repeat(&format!("Wilson, linear {beta}, d = {dimensions}"), tail(beta), REPEATS, |seed| {
+            let stream = Stream { seed, purpose: 0 };
+            let points: Vec<Vec<f64>> = (0..samples).map(|index| density.attempt(&stream, index, 0)).collect();
+            let values = linear(beta).evaluate(&points).expect("values");
+            let failures = values.iter().filter(|value| **value <= 0.0).count() as u64;
+            let counts = Counts { runs: samples, failures, voids: 0, tries: samples };
+            from_counts(&counts, 0.95, StopReason::Samples)
+        });
+        misses.want((0.93..=0.97).contains(&row.coverage), &row, "93-97 %");
     }
 }
 
@@ -138,7 +129,7 @@ fn binomial_intervals_hold_where_the_half_width_ends_the_sample() {
                 failures += (runs..next).filter(|_| random.next_u64() < limit).count() as u64;
                 runs = next;
                 let counts = Counts { runs, failures, voids: 0, tries: runs };
-                let estimate = from_counts(&counts, BinomialInterval::Wilson, 0.95, StopReason::Samples);
+                let estimate = from_counts(&counts, 0.95, StopReason::Samples);
                 if rule.at(runs, failures, estimate.relative_half_width, started).is_some() {
                     return estimate;
                 }
@@ -255,7 +246,7 @@ fn intervals_over_scenarios_hold() {
                 let (runs, failures) = sampled_scenarios(n, population, seed);
                 let (all, failed) = (runs.iter().sum(), failures.iter().sum());
                 let counts = Counts { runs: all, failures: failed, voids: 0, tries: all };
-                let draws = from_counts(&counts, BinomialInterval::Wilson, 0.95, StopReason::Samples).interval;
+                let draws = from_counts(&counts, 0.95, StopReason::Samples).interval;
                 let ours = cluster_rate(Clusters { runs: &runs, failures: &failures }, 0.95).interval;
                 let sum = |of: &[u64], drawn: &[usize]| drawn.iter().map(|at| of[*at]).sum::<u64>() as f64;
                 let rate = |drawn: &[usize]| Some(sum(&failures, drawn) / sum(&runs, drawn).max(1.0));

@@ -33,7 +33,7 @@ fn crude(density: &DensityModel, profile: &Profile, model: ModelId, thw_s: f64, 
         seed: 99,
         models: vec![model],
         level: LEVEL,
-        ..SampleOptions::new(Estimator::CRUDE, samples, SampleHeadways::Each(vec![Headway::ThwS(thw_s)]))
+        ..SampleOptions::new(Estimator::Crude, samples, SampleHeadways::Each(vec![Headway::ThwS(thw_s)]))
     };
     let backend = CpuBackend::lane_arithmetic();
     let run = Sample::plan(density.clone(), profile, &options).unwrap().run(&Executor::new(&backend)).unwrap();

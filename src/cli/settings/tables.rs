@@ -153,8 +153,6 @@ settings! {
         /// Criterion of importance sampling and of a half-width.
         #[schemars(extend("x-flag" = "criterion", "x-verbs" = ["sample"], "x-heading" = MODELS))]
         pub criterion: Criterion = Criterion::Collision,
-        /// Kind of interval of `mc`.
-        pub interval: IntervalKind = IntervalKind::Wilson,
         /// Level of the intervals.
         #[schemars(extend("minimum" = 0.5, "exclusiveMaximum" = 1.0))]
         #[schemars(extend("x-flag" = "level", "x-verbs" = ["sample"], "x-heading" = MODELS))]
@@ -191,15 +189,6 @@ pub(crate) enum EstimatorKind {
     Auto,
     Mc,
     Is,
-}
-
-/// Interval of crude Monte Carlo.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub(crate) enum IntervalKind {
-    #[default]
-    Wilson,
-    ClopperPearson,
 }
 
 settings! {

@@ -66,7 +66,7 @@ pub(super) fn sample_of(dir: &Path) -> Result<(LanePlan, DensityModel)> {
     let options = SampleOptions {
         seed: run.seed,
         models: run.models,
-        ..SampleOptions::new(Estimator::CRUDE, run.samples, headways)
+        ..SampleOptions::new(Estimator::Crude, run.samples, headways)
     };
     let plan = plan_samples(&density, &run.profile, &options)?;
     if run.plan_sha256.as_deref() != Some(plan.hash()) {

@@ -161,7 +161,7 @@ pub(crate) fn crude_rows(
     exposure: Option<&Exposure>,
     stopped: StopReason,
 ) -> Vec<EstimateRow> {
-    let (interval, level) = (options.estimator.interval(), options.level);
+    let level = options.level;
     let (headways, models, criteria) = (plan.headways.len(), plan.models.len(), Criterion::ALL.len());
     let runs = tally.valid();
     let mut rows = Vec::new();
@@ -187,7 +187,7 @@ pub(crate) fn crude_rows(
             for headway in 0..headways {
                 let failures = tally.failures[cell(headway)];
                 let counts = Counts { runs, failures, voids: tally.voids, tries: tally.tries };
-                let estimate = from_counts(&counts, interval, level, stopped);
+                let estimate = from_counts(&counts, level, stopped);
                 push(options.headway_name(headway), estimate, &[cell(headway)]);
             }
         }

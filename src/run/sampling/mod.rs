@@ -72,7 +72,7 @@ use lanesweep_support::{Error, Result};
 /// # let folder = tempfile::tempdir().unwrap();
 /// # let folder = folder.path();
 /// let headways = SampleHeadways::Each(vec![Headway::ThwS(0.6)]);
-/// let options = SampleOptions::new(Estimator::CRUDE, 10_000, headways);
+/// let options = SampleOptions::new(Estimator::Crude, 10_000, headways);
 /// let sample = Sample::plan(density, &Profile::load("paper")?, &options)?;
 /// let backend = CpuBackend::lane_arithmetic();
 /// let executor = Executor::new(&backend);
@@ -127,7 +127,7 @@ impl Sample {
     /// [`Error::Usage`] for options that contradict one another or the density.
     pub fn plan(density: DensityModel, profile: &Profile, options: &SampleOptions) -> Result<Sample> {
         let kind = match &options.estimator {
-            Estimator::Crude { .. } => SampleKind::Crude(Box::new(plan_samples(&density, profile, options)?)),
+            Estimator::Crude => SampleKind::Crude(Box::new(plan_samples(&density, profile, options)?)),
             Estimator::Search(search) => SampleKind::Search(*search),
             Estimator::Given { proposal: Some(proposal), crude_per_draw } => {
                 let (proposal, crude_per_draw) = (proposal.clone(), *crude_per_draw);

@@ -82,7 +82,7 @@ impl Sample {
         }
         let fits = search.as_ref().is_none_or(|search| search.questions.len() == options.asked().len());
         let kind = match &options.estimator {
-            Estimator::Crude { .. } => {
+            Estimator::Crude => {
                 let plan = plan_samples(&density, &profile, &options).map_err(|error| match error {
                     Error::Usage { problem, .. } => wrong(&problem),
                     other => other,

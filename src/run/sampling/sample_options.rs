@@ -6,17 +6,14 @@ use lanesweep_engine::Headway;
 use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::ModelId;
 use lanesweep_stats::density::Mixture;
-use lanesweep_stats::estimate::{BinomialInterval, Goal, Search, StopRule};
+use lanesweep_stats::estimate::{Goal, Search, StopRule};
 
 /// How probabilities are estimated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Estimator {
     /// Crude Monte Carlo.
-    Crude {
-        /// Kind of interval.
-        interval: BinomialInterval,
-    },
+    Crude,
     /// Importance sampling with a proposal that a search finds, one for all questions.
     Search(Search),
     /// Importance sampling with a given proposal.
@@ -30,22 +27,11 @@ pub enum Estimator {
 }
 
 impl Estimator {
-    /// Crude Monte Carlo with Wilson's interval.
-    pub const CRUDE: Estimator = Estimator::Crude { interval: BinomialInterval::Wilson };
-
     /// Name in files: `mc`, `is`.
     pub fn key(&self) -> &'static str {
         match self {
-            Estimator::Crude { .. } => "mc",
+            Estimator::Crude => "mc",
             Estimator::Search(_) | Estimator::Given { .. } => "is",
-        }
-    }
-
-    /// Kind of interval of crude Monte Carlo.
-    pub(super) fn interval(&self) -> BinomialInterval {
-        match self {
-            Estimator::Crude { interval } => *interval,
-            _ => BinomialInterval::Wilson,
         }
     }
 }

@@ -5,19 +5,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::interval::{Interval, clopper_pearson, rule_of_three, wilson};
+use super::interval::{rule_of_three, wilson};
 use super::stop::StopReason;
 use super::summary::Estimate;
-
-/// Interval for a count of failures. Without failures, it is the rule of three in both cases.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum BinomialInterval {
-    /// Has the nominal coverage on average.
-    Wilson,
-    /// Has at least the nominal coverage.
-    ClopperPearson,
-}
 
 /// Counts of a sample.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -45,14 +35,13 @@ impl std::ops::Add for Counts {
     }
 }
 
-/// The estimate from counts.
-pub fn from_counts(counts: &Counts, interval: BinomialInterval, level: f64, stopped: StopReason) -> Estimate {
+/// The estimate from counts, with Wilson's interval, or the rule of three without failures.
+pub fn from_counts(counts: &Counts, level: f64, stopped: StopReason) -> Estimate {
     let Counts { runs, failures, voids, .. } = *counts;
     let probability = if runs > 0 { failures as f64 / runs as f64 } else { 0.0 };
-    let interval: Interval = match interval {
-        _ if failures == 0 => rule_of_three(runs, level),
-        BinomialInterval::Wilson => wilson(failures as f64, runs as f64, level),
-        BinomialInterval::ClopperPearson => clopper_pearson(failures, runs, level),
+    let interval = match failures {
+        0 => rule_of_three(runs, level),
+        _ => wilson(failures as f64, runs as f64, level),
     };
     let variance = probability * (1.0 - probability) / runs.max(1) as f64;
     let mut estimate = Estimate::new("monte_carlo", probability, variance, interval, runs, failures, voids, stopped);

@@ -148,7 +148,7 @@ fn parameterization(bytes: &[u8], _: &Path, seeds: &Seeds, _: bool) -> Result<()
 pub fn small_plan(density: &DensityModel, profile: &Profile) -> Result<LanePlan> {
     let options = SampleOptions {
         seed: 5,
-        ..SampleOptions::new(Estimator::CRUDE, 20, SampleHeadways::Each(vec![Headway::ThwS(1.0)]))
+        ..SampleOptions::new(Estimator::Crude, 20, SampleHeadways::Each(vec![Headway::ThwS(1.0)]))
     };
     plan_samples(density, profile, &options)
 }

@@ -17,8 +17,9 @@ const MAX_OVERLAPPING: f64 = 0.1;
 const MIN_EDGE: f64 = 0.6;
 /// Distance of a lane line from the middle between the vehicles of its lanes from which on it is not where they see it, m.
 const MAX_LINE_OFF_M: f64 = 0.45;
-/// A larger fraction of the vehicles of a direction does not change its place across the road from part to part of a recording.
-const MAX_MOVED: f64 = 0.3;
+/// Fraction of the vehicles in a part of a recording without another part's vehicle within this distance across the road, m.
+const MAX_ALONE: f64 = 0.4;
+const BESIDE_M: f64 = 0.5;
 
 impl Understanding {
     /// Finds lengths that end at one value.
@@ -47,17 +48,16 @@ impl Understanding {
             of.sort_by_key(|(first_frame, _)| *first_frame);
             let changed = |parts: &usize| {
                 let (before, after) = of.split_at(parts * of.len() / 8);
-                let sorted = |part: &[(i64, f64)]| {
-                    let mut d_m: Vec<f64> = part.iter().map(|(_, d_m)| *d_m).collect();
-                    d_m.sort_by(f64::total_cmp);
-                    d_m
+                // Vehicles beside none of the other part.
+                let alone = |of: &[(i64, f64)], others: &[(i64, f64)]| {
+                    let mut sorted: Vec<f64> = others.iter().map(|(_, d_m)| *d_m).collect();
+                    sorted.sort_by(f64::total_cmp);
+                    let below = |d_m: f64| sorted.partition_point(|other| *other < d_m);
+                    let is_alone = |d_m: f64| below(d_m + BESIDE_M) == below(d_m - BESIDE_M);
+                    let number = of.iter().filter(|(_, d_m)| is_alone(*d_m)).count();
+                    number >= MIN_VEHICLES && number as f64 > MAX_ALONE * of.len() as f64
                 };
-                let parts = [sorted(before), sorted(after)];
-                let share = |of: &[f64], d_m: f64| of.partition_point(|other| *other <= d_m) as f64 / of.len() as f64;
-                let difference = |d_m: &f64| (share(&parts[0], *d_m) - share(&parts[1], *d_m)).abs();
-                let largest = parts.iter().flatten().map(difference).fold(0.0, f64::max);
-                // Beyond Kolmogorov and Smirnov's limit, by what lanes gain or lose with the traffic.
-                largest > MAX_MOVED + 1.63 * (1.0 / before.len() as f64 + 1.0 / after.len() as f64).sqrt()
+                alone(before, after) || alone(after, before)
             };
             if let Some(parts) = (1..8).find(changed) {
                 let (way, frame) = (way(carriageway), of[parts * of.len() / 8].0);
