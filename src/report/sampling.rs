@@ -325,7 +325,7 @@ pub(super) fn short(value: f64) -> String {
 fn interval_text(low: f64, high: f64, kind: IntervalKind) -> String {
     match kind {
         IntervalKind::RuleOfThree => format!("≤ {}", short(high)),
-        _ => format!("{} … {}", short(low), short(high)),
+        _ => format!("{}…{}", short(low), short(high)),
     }
 }
 

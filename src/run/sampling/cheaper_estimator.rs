@@ -81,7 +81,7 @@ impl Sample {
             // Of the rarest question; where the pilot does not know it, no division costs less.
             let rarest = Some(needs[all - 1] / (RESERVE * (z / half_width).powi(2))).filter(|odds| odds.is_finite());
             let crude =
-                rarest.unwrap_or(0.0) * (Search::CRUDE_FAILURES + Goal::CRUDE_FAILURES / half_width) * left.min(lanes);
+                rarest.unwrap_or(0.0) * (Search::CRUDE_FAILURES + Goal::crude_failures(half_width)) * left.min(lanes);
             let of_point = valued * left.min(lanes);
             let points = SEARCH_POINTS[0] + SEARCH_POINTS[1] * (left - 1.0);
             let draws = VARIANCE * left.sqrt() * (z / half_width).powi(2);

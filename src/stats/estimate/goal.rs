@@ -30,9 +30,12 @@ pub struct Goal {
 impl Goal {
     /// Half-width if none is asked for.
     pub const HALF_WIDTH: f64 = 0.1;
-    /// Failures, times the half-width, that the final draws of the density are expected to hold: one failure more or less
-    /// moves the end of the interval by a quarter of the half-width.
-    pub const CRUDE_FAILURES: f64 = 4.0;
+
+    /// Failures that the final draws of the density are expected to hold: one failure more or less moves the end of the
+    /// interval by half the half-width, and those that may be missed are less than half of P.
+    pub fn crude_failures(half_width: f64) -> f64 {
+        (2.0 / half_width).max(8.0)
+    }
 
     /// The final draws after a search, for all questions together: the worst one decides.
     pub fn draws(&self, found: &[Found], seed: u64, level: f64) -> Importance {
@@ -41,7 +44,7 @@ impl Goal {
         let most = found.iter().map(of).fold(0.0, f64::max);
         let draws = ((RESERVE * most).ceil() as u64).max(MIN_DRAWS).min(self.max_draws);
         let crude = |found: &Found| match found.probability > 0.0 {
-            true => Goal::CRUDE_FAILURES / (self.half_width * found.probability),
+            true => Goal::crude_failures(self.half_width) / found.probability,
             false => CRUDE_WITHOUT_FAILURE,
         };
         let crude = found.iter().map(crude).fold(0.0, f64::max).min(self.max_crude as f64);
