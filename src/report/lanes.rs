@@ -8,7 +8,7 @@ use crate::records::{at_contact, smallest_gap_m, time_s};
 use lanesweep_engine::{Chunk, Headway, LanePlan, Outcome};
 use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::ModelId;
-use lanesweep_run::sampling::{FailingLane, Sample};
+use lanesweep_run::sampling::{FailingLane, Origin, Sample};
 use lanesweep_run::study::{Study, robust_lanes};
 use lanesweep_stats::density::DensityModel;
 use lanesweep_support::files::make_folder_of;
@@ -176,6 +176,11 @@ fn sampled_columns(density: &DensityModel) -> Vec<Column> {
         c("model", ColumnKind::Name, "", "Driver model."),
     ];
     columns.extend(outcome_columns(ColumnKind::Binary32));
+    columns.extend([
+        c("kernel", ColumnKind::Whole, "1", "Kernel of the sample, from 0: the one that it was drawn from, or that explains a draw of a proposal best."),
+        c("scenario", ColumnKind::Name, "", "Recorded scenario of the kernel; null where the density has none."),
+        c("weight", ColumnKind::Binary64, "1", "Weight of the lane in P, if it fails: P is the sum of weights over the number of draws (of a proposal, with those of the density beside)."),
+    ]);
     columns.extend(density.space.parameters().iter().map(|parameter| {
         let (name, unit) = (parameter.name.clone(), parameter.unit.clone());
         Column::new(name, ColumnKind::Binary32, unit, "Parameter that was drawn.".to_owned())
@@ -198,10 +203,11 @@ pub fn write_sampled_chunk(table: &mut TableWriter, sample: &Sample, plan: &Lane
         if drawn.is_void() {
             continue;
         }
+        let origin = Origin { kernel: generator.points.component(unit, drawn.tries), weight: 1.0 };
         let point: Vec<f64> = drawn.values[..dimensions].iter().map(|&v| f64::from(v)).collect();
         for (at, outcome) in lanes.iter().enumerate() {
             let lane = (unit, at / models, plan.models[at % models]);
-            table.row(&sampled_row(sample, lane, &point, outcome))?;
+            table.row(&sampled_row(sample, lane, &point, outcome, origin))?;
         }
     }
     Ok(())
@@ -213,7 +219,7 @@ pub fn write_sampled_chunk(table: &mut TableWriter, sample: &Sample, plan: &Lane
 /// As [`TableWriter::row`].
 pub fn write_failing_lane(table: &mut TableWriter, sample: &Sample, lane: &FailingLane) -> Result<()> {
     let of = (lane.sample, lane.headway, lane.model);
-    table.row(&sampled_row(sample, of, &lane.point, &lane.outcome))
+    table.row(&sampled_row(sample, of, &lane.point, &lane.outcome, lane.origin))
 }
 
 /// A row of [`sampled_columns`].
@@ -222,8 +228,10 @@ fn sampled_row<'a>(
     (index, headway, model): (u64, usize, ModelId),
     point: &[f64],
     outcome: &Outcome<f64>,
+    origin: Origin,
 ) -> Vec<Cell<'a>> {
     let id = sample.density.space.id();
+    let scenario = origin.kernel.and_then(|kernel| sample.density.scenarios.get(kernel as usize));
     let mut row = vec![
         Cell::Whole(index as i64),
         Cell::text(id.category.key()),
@@ -232,6 +240,9 @@ fn sampled_row<'a>(
         Cell::text(model.name()),
     ];
     row.extend(outcome_cells(outcome, sample.profile.frame.dt_s));
+    row.push(origin.kernel.map_or(Cell::Null, |kernel| Cell::Whole(i64::from(kernel))));
+    row.push(scenario.map_or(Cell::Null, |scenario| Cell::text(scenario.id.as_str())));
+    row.push(Cell::Number(origin.weight));
     row.extend(point.iter().map(|&v| Cell::Number(v)));
     row
 }

@@ -5,6 +5,7 @@ use crate::common::mined::{fitted, scenarios};
 use crate::common::program::{json, ran, refused, table};
 use crate::common::{self, program};
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use lanesweep::engine::{Backend, CpuBackend, Executor, Headway, LanePlan, SampleTally, Wanted};
@@ -130,9 +131,19 @@ fn a_run_in_parts_is_the_run_in_one_and_its_failing_lanes_are_the_first_of_all_r
     assert!(all.lines().count() > 1001 && (8..=1 + 7 * 3 * MODELS).contains(&seven.lines().count()));
     assert!(read("first.csv") == all && read("joined.csv") == all, "the first thousand");
     assert!(read("seven.csv") == seven && read("counted.csv") == seven, "the first seven");
+    let of = density(Category::CutIn, "2");
     // A row says how to run its lane again, and it is the same lane.
     for row in table(&dir.join("seven.csv")).iter().step_by(9) {
         let key = format!("#{}/{}/{}/{}", row["sample"], row["variant"], row["headway"], row["model"]);
+        let kernel: usize = row["kernel"].parse().unwrap();
+        assert_eq!((&*row["scenario"], &*row["weight"]), (&*of.scenarios[kernel].id, "1"), "{key}");
+        // It lies around its kernel.
+        for ((parameter, middle), spread) in
+            of.space.parameters().iter().zip(&of.kde.points()[kernel]).zip(of.kde.spread())
+        {
+            let value: f64 = row[&parameter.name].parse().unwrap();
+            assert!((value - middle).abs() < 6.0 * spread, "{key}: {} is {value}", parameter.name);
+        }
         let (code, trace, summary) = program::lanesweep(dir, &["simulate", "--from", "whole", "--lane", &key]);
         assert!(code == 0 && trace.starts_with("t_s,"), "{summary}");
         for (name, column) in [("Collision", "collision"), ("TTC", "ttc"), ("BTN", "btn")] {
@@ -210,6 +221,12 @@ fn a_searched_proposal_can_be_sampled_again_and_in_shards_with_its_failing_draws
         let rows = table(&dir.join(whole));
         assert!(rows == table(&dir.join(parts)), "{whole}");
         assert!(rows.len() == 1000 && rows.iter().all(|row| row["collision"] == "1"), "{whole}: {}", rows.len());
+        // At least one draw of the density belongs to each of the proposal.
+        let weight = |row: &BTreeMap<String, String>| row["weight"].parse::<f64>().unwrap();
+        assert!(
+            rows.iter().all(|row| weight(row) > 0.0 && weight(row) <= 1.0 && !row["scenario"].is_empty()),
+            "{whole}"
+        );
     }
     let estimate = |folder: &str| json(&dir.join(folder).join("estimate.json"))["estimates"][0]["estimate"].clone();
     let truth = estimate("mc")["probability"].as_f64().unwrap();

@@ -31,7 +31,23 @@ pub struct FailingLane {
     pub model: ModelId,
     /// The outcome.
     pub outcome: Outcome<f64>,
+    /// Where the sample comes from.
+    pub origin: Origin,
 }
+
+/// Where a sample comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Origin {
+    /// The kernel that it was drawn from, or that explains a draw of a proposal best; none of given points.
+    pub kernel: Option<u32>,
+    /// Its weight in the sum that gives P times the number of draws; 1 with crude Monte Carlo.
+    pub weight: f64,
+}
+
+/// Takes the lanes.
+type Each<'e> = &'e mut dyn FnMut(&FailingLane) -> Result<()>;
+/// The origin of a sample with its index and point.
+type OriginOf<'o> = &'o dyn Fn(u64, &[f64]) -> Origin;
 
 /// The failures that are still to be found: one number per model and criterion.
 struct Missing(Vec<[u64; Criterion::ALL.len()]>);
@@ -66,20 +82,18 @@ impl Sample {
     ///
     /// # Errors
     /// Those of the lanes and of `each`; [`Error::Interrupted`].
-    pub fn failing_lanes(
-        &self,
-        result: &SampleResult,
-        limit: u64,
-        executor: &Executor,
-        each: &mut dyn FnMut(&FailingLane) -> Result<()>,
-    ) -> Result<()> {
+    pub fn failing_lanes(&self, result: &SampleResult, limit: u64, executor: &Executor, each: Each) -> Result<()> {
         let models = &self.options.models;
         match (&self.kind, &result.crude) {
             (SampleKind::Crude(plan), Some(run)) => {
                 let tally = &run.tally;
                 let counted = |model, criterion| cells(plan, model, criterion).map(|cell| tally.failures[cell]).sum();
                 let missing = Missing::new(models, limit, counted);
-                self.find(missing, tally.covered(), executor, each, |missing| draws_of(plan, tally, missing))
+                let origin = |index, _: &[f64]| {
+                    let kernel = plan.generator().and_then(|of| of.points.component(index, of.draw(index).tries));
+                    Origin { kernel, weight: 1.0 }
+                };
+                self.find(missing, tally.covered(), executor, (each, &origin), |missing| draws_of(plan, tally, missing))
             }
             (SampleKind::Weighted(weighted), _) => {
                 let (nominal, asked) = (truncated(&self.density)?, self.options.asked());
@@ -89,8 +103,14 @@ impl Sample {
                     rows.map(|(_, row)| row.estimate.failures).sum()
                 };
                 let draw = |index| weighted.draws.draw(&nominal, &weighted.proposal, index);
+                let origin = |_, point: &[f64]| {
+                    let explained = nominal.kernels().responsibilities(point).into_iter().zip(0..);
+                    let (_, kernel) = explained.fold((0.0, 0), |best, of| if of.0 > best.0 { of } else { best });
+                    let weight = weighted.draws.weight(&nominal, &weighted.proposal, point);
+                    Origin { kernel: Some(kernel), weight }
+                };
                 let all = 0..weighted.draws.draws;
-                self.find(Missing::new(models, limit, counted), &[all], executor, each, |_| draw)
+                self.find(Missing::new(models, limit, counted), &[all], executor, (each, &origin), |_| draw)
             }
             _ => Err(Error::Internal("a run without counts has no failing lanes".to_owned())),
         }
@@ -102,7 +122,7 @@ impl Sample {
         mut missing: Missing,
         samples: &[Range<u64>],
         executor: &Executor,
-        each: &mut dyn FnMut(&FailingLane) -> Result<()>,
+        (each, origin): (Each, OriginOf),
         draws: impl Fn(&Missing) -> D,
     ) -> Result<()> {
         let all = samples.iter().map(|range| range.end - range.start).sum();
@@ -120,7 +140,7 @@ impl Sample {
             let drawn = piece.clone().into_par_iter().filter_map(|index| Some((index, draw(index)?)));
             let (indices, points): (Vec<u64>, Vec<Vec<f64>>) = drawn.unzip();
             if !points.is_empty() {
-                self.find_among(&indices, &points, &open, &mut missing, each)?;
+                self.find_among(&indices, &points, &open, &mut missing, (&mut *each, origin))?;
             }
             done += piece.end - piece.start;
             executor.progress.iter().for_each(|progress| progress(piece.end - piece.start));
@@ -136,7 +156,7 @@ impl Sample {
         points: &[Vec<f64>],
         open: &[usize],
         missing: &mut Missing,
-        each: &mut dyn FnMut(&FailingLane) -> Result<()>,
+        (each, origin): (Each, OriginOf),
     ) -> Result<()> {
         let models: Vec<ModelId> = open.iter().map(|model| self.options.models[*model]).collect();
         let plan = plan_points(&self.density, points, &self.profile, &models, &self.options.headways)?;
@@ -154,6 +174,7 @@ impl Sample {
                             headway: at / models.len(),
                             model: models[model],
                             outcome: *outcome,
+                            origin: origin(indices[unit as usize], &points[unit as usize]),
                         })?;
                     }
                 }

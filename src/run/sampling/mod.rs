@@ -25,7 +25,7 @@ pub use bandwidth::AtBandwidth;
 pub use cheaper_estimator::Choice;
 pub use crude::{Checkpoint, CheckpointRow, CrudeRun};
 pub use estimate_rows::{EstimateRow, NoTraffic, RecordedRatios, Risk, RiskRate};
-pub use failing_lanes::FailingLane;
+pub use failing_lanes::{FailingLane, Origin};
 pub use generator::{SAMPLE_PURPOSE, generator_of, generator_of_points};
 pub use limit_state::{LaneLimitState, limit_state, truncated};
 pub use plan::{plan_points, plan_samples};

@@ -228,7 +228,7 @@ impl Mixture {
     }
 
     /// The fraction of each component in the density at a point, sum 1; all 0 if the density is 0.
-    pub(crate) fn responsibilities(&self, point: &[f64]) -> Vec<f64> {
+    pub fn responsibilities(&self, point: &[f64]) -> Vec<f64> {
         let mut parts = Vec::new();
         let top = self.log_parts(point, &mut parts);
         if top == f64::NEG_INFINITY {

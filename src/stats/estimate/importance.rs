@@ -39,6 +39,15 @@ impl Importance {
         Importance { draws, crude_per_draw: crude.div_ceil(draws.max(1)).max(1), ..self }
     }
 
+    /// The weight 1/(m + g/f) of a failing draw of the density f or of the proposal g, with m draws of f for each of g.
+    pub fn weight(&self, nominal: &dyn Density, proposal: &Mixture, point: &[f64]) -> f64 {
+        let validity = nominal.validity_fraction();
+        // An index of the density whose attempts are all invalid is a draw that does not fail.
+        let is_drawn = 1.0 - (1.0 - validity).powi(ATTEMPTS as i32);
+        let ratio = libm::exp(proposal.log_density(point) - nominal.log_density(point)) * validity;
+        1.0 / (self.crude_per_draw as f64 * is_drawn + ratio)
+    }
+
     /// The draw of the proposal of this index; `None` for an invalid one.
     pub fn draw(&self, nominal: &dyn Density, proposal: &Mixture, index: u64) -> Option<Vec<f64>> {
         let stream = Stream { seed: self.seed, purpose: purpose::PROPOSAL };
@@ -66,12 +75,9 @@ pub(super) fn weighted_failures(
 ) -> Result<Vec<WeightedFailure>> {
     let [of_proposal, of_density] = purposes.map(|purpose| Stream { seed: options.seed, purpose });
     let crude = options.crude_per_draw;
-    let validity = nominal.validity_fraction();
-    // An index of the density whose attempts are all invalid is a draw that does not fail.
-    let is_drawn = 1.0 - (1.0 - validity).powi(ATTEMPTS as i32);
     let weighted = |(is_crude, of): (bool, Failure)| {
-        let ratio = libm::exp(proposal.log_density(&of.point) - nominal.log_density(&of.point)) * validity;
-        WeightedFailure { of, is_crude, weight: 1.0 / (crude as f64 * is_drawn + ratio) }
+        let weight = options.weight(nominal, proposal, &of.point);
+        WeightedFailure { of, is_crude, weight }
     };
     let attempt = |index| Some((index, proposal.draw(&of_proposal, index, 0))).filter(|at| nominal.is_valid(&at.1));
     let attempts: Vec<Option<(u64, Vec<f64>)>> = range.clone().into_par_iter().map(attempt).collect();
