@@ -4,7 +4,7 @@
 use serde::Serialize;
 
 use super::sampling::{SampleReport, short};
-use lanesweep_run::sampling::{Checkpoint, EstimateRow, RiskRate, TRAFFIC_DRAWS, Uncertainty};
+use lanesweep_run::sampling::{CarrierRow, Checkpoint, EstimateRow, RiskRate, TRAFFIC_DRAWS, Uncertainty};
 use lanesweep_stats::estimate::{Ratio, Warning, WeightFigures};
 use lanesweep_support::readable::{count, count_of, counted, significant};
 use lanesweep_support::table::{NamedValue, Table};
@@ -54,6 +54,8 @@ impl SampleReport {
             .column("variance_reduction", |row| known(row.estimate.variance_reduction))
             .column("no_traffic_fraction", |row| row.no_traffic.map(|of| of.fraction))
             .column("possible_probability", |row| row.no_traffic.map(|of| of.possible_probability))
+            .column("carrier", |row| row.carriers.first().map(carrier_name))
+            .column("carrier_fraction", |row| row.carriers.first().map(|carrier| carrier.of.fraction))
             .columns(
                 [("probability_narrow", 0), ("probability_wide", 1)],
                 |(name, _)| name,
@@ -107,6 +109,11 @@ pub(super) fn convergence_csv(checkpoints: &[Checkpoint]) -> String {
         .csv()
 }
 
+/// The id of a scenario that carries a part of P, or its kernel.
+fn carrier_name(carrier: &CarrierRow) -> String {
+    carrier.scenario.clone().unwrap_or_else(|| format!("kernel {}", carrier.of.kernel))
+}
+
 /// A number; NaN is none.
 fn known(value: f64) -> Option<f64> {
     Some(value).filter(|v| !v.is_nan())
@@ -121,11 +128,17 @@ impl SampleReport {
     /// What is said about the shown rows, each time with what it is said about. Too few scenarios are said once.
     pub(super) fn remarks(&self) -> Vec<(String, String)> {
         let name = |row: &EstimateRow| format!("{} {} {}", row.model.name(), row.criterion.label(), row.headway);
-        let (mut remarks, mut few) = (Vec::new(), Vec::new());
+        let (mut remarks, mut few, mut most) = (Vec::new(), Vec::new(), None);
         for row in self.estimates.iter().filter(|row| row.is_told(&self.estimates)) {
             for warning in &row.estimate.trust.warnings {
                 match warning {
-                    Warning::FewScenarios { scenarios } => few.push(*scenarios),
+                    Warning::FewScenarios { scenarios } => {
+                        few.push(*scenarios);
+                        let carriers = row.carriers.iter().map(|carrier| {
+                            format!("{} % {}", significant(100.0 * carrier.of.fraction, 2), carrier_name(carrier))
+                        });
+                        most.get_or_insert(format!("{}: {}", name(row), carriers.collect::<Vec<_>>().join(", ")));
+                    }
                     // The rule tells it of all rows.
                     Warning::BandwidthDecides { .. } => (),
                     _ => remarks.push((name(row), warning.to_string())),
@@ -145,8 +158,9 @@ impl SampleReport {
             let about = (
                 counted(few.len(), "row"),
                 format!(
-                    "the failures come from effectively {range} scenarios; with fewer than {}, other recordings would give \
-                     another probability, and nothing tells how much so",
+                    "the failures come from effectively {range} scenarios ({}); with fewer than {}, other recordings would \
+                     give another probability, and nothing tells how much so",
+                    most.unwrap_or_default(),
                     Warning::MIN_SCENARIOS
                 ),
             );

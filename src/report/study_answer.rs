@@ -25,8 +25,8 @@ const SCORE: usize = 3;
 const NUMBERS: [usize; 2] = [4, 6];
 
 /// What the last columns say.
-const LEGEND: &str = "Missed: collisions that S alone has; invented: S' alone. Ties: F1 within chance of the best's; 2.0x: \
-                      twice the scenarios would tell, if F1 stays.";
+const LEGEND: &str = "Missed: S alone collides; invented: S' alone. Ties: F1 within chance of the best's; 2.0x: twice the \
+                      scenarios would tell, if F1 stays.";
 
 /// The rows, with the columns of words in an order.
 fn table(rows: &[[String; 7]], words: [usize; 4]) -> Table {

@@ -14,7 +14,7 @@ use lanesweep::model::driver::{MODELS, ModelId};
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{Estimator, Sample, SampleHeadways, SampleOptions, plan_samples};
 use lanesweep::scenario::{Category, Driven};
-use lanesweep::stats::density::{DensityModel, Exposure, Kde, read_density, write_density};
+use lanesweep::stats::density::{Bandwidth, DensityModel, Exposure, Kde, read_density, write_density};
 use lanesweep::stats::estimate::Search;
 
 fn density(category: Category, key: &str) -> DensityModel {
@@ -278,10 +278,17 @@ fn p_at_both_ends_of_the_bandwidths_interval_is_that_of_the_density_there_by_eit
             assert!((at.factor * density.kde.bandwidth().value / value - 1.0).abs() < 1e-12, "{at:?}");
         }
     }
-    // The kernels' tails make these failures.
-    for row in rows {
-        assert_eq!(row.estimate.trust.usable(), "bandwidth decides", "{row:?}");
-    }
+    // A bandwidth that is far too narrow for the likelihood is told.
+    let of = *density.kde.bandwidth();
+    let kde = Kde::from_parts(
+        density.kde.points().to_vec(),
+        density.kde.scale().to_vec(),
+        Bandwidth { value: 0.3 * of.value, ..of },
+    );
+    let mut narrow = density;
+    narrow.kde = kde.unwrap();
+    let narrow = row(narrow, Estimator::Crude, 200_000);
+    assert_eq!(narrow.estimate.trust.usable(), "bandwidth decides", "{narrow:?}");
     // Where most lanes fail, they do so at any bandwidth.
     let dir = folder();
     let said = ran(dir.path(), "-q sample density.json --thw 0.2 --models Reg157 --samples 3000 --backend cpu");
@@ -356,6 +363,9 @@ fn draws_of_a_proposal_tell_their_scenarios_by_the_kernels_that_explain_them() {
     let width = |row| libm::log(interval(row)[1] / interval(row)[0]);
     let ratio = width(&rows[0]) / width(&crude);
     assert!((0.6..1.7).contains(&ratio), "{ratio}");
+    // Both name the scenario that carries most.
+    let carrier = |row: &serde_json::Value| row["carriers"][0]["scenario"].as_str().unwrap().to_owned();
+    assert_eq!(carrier(&crude), carrier(&rows[0]));
     let few = estimated(dir.path(), "nine.json", how).0["estimates"][0].clone();
     assert!(few["estimate"]["trust"]["warnings"].to_string().contains("few_scenarios"), "{few}");
 }

@@ -85,6 +85,9 @@ impl Sample {
         };
         self.count_no_traffic(&mut result.rows, &headways)?;
         result = self.at_bandwidths(result)?;
+        for carrier in result.rows.iter_mut().flat_map(|row| &mut row.carriers) {
+            carrier.scenario = density.scenarios.get(carrier.of.kernel).map(|scenario| scenario.id.clone());
+        }
         let is_comparable = !density.scenarios.is_empty();
         let replayed = is_comparable.then(|| replay(density, &self.profile, &options.models, &headways));
         let Some([recorded, replayed]) = replayed.transpose()?.flatten() else {

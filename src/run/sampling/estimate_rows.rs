@@ -11,7 +11,7 @@ use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::ModelId;
 use lanesweep_stats::density::{Exposure, Rate, normal_quantile};
 use lanesweep_stats::estimate::{
-    Clusters, Counts, Estimate, Interval, Ratio, StopReason, Warning, cluster_rate, from_clusters, from_counts,
+    Carrier, Clusters, Counts, Estimate, Interval, Ratio, StopReason, Warning, cluster_rate, from_clusters, from_counts,
 };
 
 /// What draws without possible traffic are of an estimate: the vehicle that cuts out drives through the one ahead of it. Maps and
@@ -48,6 +48,8 @@ pub struct EstimateRow {
     pub recorded: Option<RecordedRatios>,
     /// What draws without possible traffic are of it; `None` where every draw is possible.
     pub no_traffic: Option<NoTraffic>,
+    /// The scenarios that carry most of P; none where samples do not identify them.
+    pub carriers: Vec<CarrierRow>,
     /// P at the lower and at the upper end of the interval of the density's bandwidth; none if the density does not know it.
     pub at_bandwidths: [Option<AtBandwidth>; 2],
 }
@@ -59,6 +61,16 @@ pub struct RecordedRatios {
     pub replayed: Ratio,
     /// P/S: rates of the samples. Only for crude Monte Carlo, whose draws identify their scenario.
     pub sampled: Option<Ratio>,
+}
+
+/// A scenario that carries a part of P.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CarrierRow {
+    /// Its id; `None` if the density does not hold it.
+    pub scenario: Option<String>,
+    /// Its kernel and fraction.
+    #[serde(flatten)]
+    pub of: Carrier,
 }
 
 impl EstimateRow {
@@ -115,17 +127,24 @@ impl EstimateRow {
             uncertainty: None,
             recorded: None,
             no_traffic: None,
+            carriers: Vec::new(),
             at_bandwidths: [None; 2],
         }
     }
 
-    /// Takes the estimate that includes the uncertainty of the data, and the effective number of failing scenarios.
+    /// Takes the estimate that includes the uncertainty of the data, the effective number of failing scenarios, and those
+    /// that carry most.
     /// Without them the row gets a warning.
-    pub(super) fn with_data(mut self, with: Option<(Estimate, f64)>, exposure: Option<&Exposure>) -> EstimateRow {
-        let Some((estimate, failing_scenarios)) = with else {
+    pub(super) fn with_data(
+        mut self,
+        with: Option<(Estimate, f64, Vec<Carrier>)>,
+        exposure: Option<&Exposure>,
+    ) -> EstimateRow {
+        let Some((estimate, failing_scenarios, carriers)) = with else {
             self.estimate.trust.warn_if(true, Warning::DataLeftOut);
             return self;
         };
+        self.carriers = carriers.into_iter().map(|of| CarrierRow { scenario: None, of }).collect();
         let of_draws = self.estimate.variance;
         (self.estimate, self.failing_scenarios) = (estimate, Some(failing_scenarios));
         self.risk = Risk::of(&self.estimate, exposure);
@@ -164,6 +183,7 @@ pub(crate) fn crude_rows(
     let level = options.level;
     let (headways, models, criteria) = (plan.headways.len(), plan.models.len(), Criterion::ALL.len());
     let runs = tally.valid();
+    let kernels = plan.generator().map_or(0, |of| of.points.components() as usize);
     let mut rows = Vec::new();
     for (model, &id) in plan.models.iter().enumerate() {
         for criterion in Criterion::ALL {
@@ -172,7 +192,10 @@ pub(crate) fn crude_rows(
                 let with = tally.by_kernel.as_ref().map(|counts| {
                     let (runs, failures) = counts.over(cells);
                     let of = cluster_rate(Clusters { runs: &runs, failures: &failures }, level);
-                    (estimate.clone().over_scenarios(&of), of.effective_failing)
+                    // Kernels of large densities are counted in groups.
+                    let is_each = failures.len() == kernels;
+                    let carriers = Carrier::most(failures.iter().filter(|_| is_each).map(|of| *of as f64));
+                    (estimate.clone().over_scenarios(&of), of.effective_failing, carriers)
                 });
                 let row = EstimateRow::of_draws(id, criterion, headway, estimate, exposure);
                 rows.push(row.with_data(with, exposure));

@@ -24,7 +24,7 @@ pub use against_recorded::TRAFFIC_DRAWS;
 pub use bandwidth::AtBandwidth;
 pub use cheaper_estimator::Choice;
 pub use crude::{Checkpoint, CheckpointRow, CrudeRun};
-pub use estimate_rows::{EstimateRow, NoTraffic, RecordedRatios, Risk, RiskRate};
+pub use estimate_rows::{CarrierRow, EstimateRow, NoTraffic, RecordedRatios, Risk, RiskRate};
 pub use failing_lanes::{FailingLane, Origin};
 pub use generator::{SAMPLE_PURPOSE, generator_of, generator_of_points};
 pub use limit_state::{LaneLimitState, limit_state, truncated};

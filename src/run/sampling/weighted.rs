@@ -135,7 +135,10 @@ impl Sample {
         for (((question, _), estimate), shares) in tally.sums.iter().zip(estimates).zip(&shares) {
             let estimate = estimate.after_search(searched);
             let headway = options.headway_name(question.headway);
-            let with = shares.as_ref().map(|of| (estimate.clone().over_kernels(of), of.effective_failing));
+            let with = shares.as_ref().map(|of| {
+                let carriers = of.carriers.clone();
+                (estimate.clone().over_kernels(of), of.effective_failing, carriers)
+            });
             let row = EstimateRow::of_draws(question.model, question.criterion, headway, estimate, exposure);
             rows.push(row.with_data(with, exposure));
         }

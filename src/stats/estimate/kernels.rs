@@ -2,6 +2,7 @@
 //! draws do not come from the kernels themselves.
 
 use rayon::prelude::*;
+use serde::Serialize;
 
 use super::importance::{Importance, weighted_failures};
 use super::interval::log_normal;
@@ -16,14 +17,38 @@ const DRAWS: u64 = 4096;
 /// Number of points whose kernels are held at once.
 const AT_ONCE: usize = 256;
 
+/// A kernel, that is a scenario, with the fraction of the failures that come from it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Carrier {
+    /// The kernel, from 0.
+    pub kernel: usize,
+    /// Fraction of P.
+    pub fraction: f64,
+}
+
+impl Carrier {
+    /// The three kernels that carry most, the largest first, from what each carries.
+    pub fn most(carried: impl IntoIterator<Item = f64>) -> Vec<Carrier> {
+        let carried: Vec<f64> = carried.into_iter().collect();
+        let all: f64 = carried.iter().sum();
+        let of = |(kernel, carried): (usize, f64)| Carrier { kernel, fraction: carried / all };
+        let mut most: Vec<Carrier> = carried.into_iter().enumerate().filter(|(_, of)| *of > 0.0).map(of).collect();
+        most.sort_by(|a, b| b.fraction.total_cmp(&a.fraction));
+        most.truncate(3);
+        most
+    }
+}
+
 /// Contributions of kernels of equal weight to the probability of failure.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct KernelShares {
     /// Relative variance of the probability over repeated sampling of the kernels: N/(N − 1)·Σ(s_j − 1/N)², where s_j
     /// is the fraction of failures from kernel j.
     pub relative_variance: f64,
     /// Effective number of kernels that failures come from, 1/Σ s_j².
     pub effective_failing: f64,
+    /// Those that carry most.
+    pub carriers: Vec<Carrier>,
 }
 
 /// Counts the fractions of every question over draws of a proposal and about `crude` draws of the density beside them. Each
@@ -87,7 +112,8 @@ impl Counts {
         let between: f64 = self.sums.iter().map(|[sum, square]| sum * sum - square).sum();
         let of_squares = (between / pairs).clamp(1.0 / n as f64, 1.0);
         let relative_variance = n as f64 / (n as f64 - 1.0) * (of_squares - 1.0 / n as f64);
-        Some(KernelShares { relative_variance, effective_failing: 1.0 / of_squares })
+        let carriers = Carrier::most(self.sums.iter().map(|[sum, _]| *sum));
+        Some(KernelShares { relative_variance, effective_failing: 1.0 / of_squares, carriers })
     }
 }
 
@@ -123,10 +149,11 @@ mod tests {
         let kernels = Mixture::of_kernels(points, &[0.3]).unwrap();
         let beyond = |points: &[Vec<f64>]| Ok(points.iter().map(|x| 3.0 - x[0]).collect());
         let proposal = Mixture::of_kernels(vec![vec![3.2]], &[0.4]).unwrap();
-        let shares = kernel_shares(&kernels, &kernels, &proposal, &beyond, (5, 400)).unwrap()[0].unwrap();
+        let shares = kernel_shares(&kernels, &kernels, &proposal, &beyond, (5, 400)).unwrap().remove(0).unwrap();
         // Ten of 40 have a share of 0.1 each: Σ s² = 0.1.
         assert!((shares.effective_failing / 10.0 - 1.0).abs() < 0.01, "{shares:?}");
         assert!((shares.relative_variance / (40.0 / 39.0 * 0.075) - 1.0).abs() < 0.01, "{shares:?}");
+        assert!(shares.carriers.iter().all(|of| of.kernel % 4 == 0 && (of.fraction - 0.1).abs() < 0.05), "{shares:?}");
         let never = |points: &[Vec<f64>]| Ok(vec![1.0; points.len()]);
         assert_eq!(kernel_shares(&kernels, &kernels, &proposal, &never, (5, 400)).unwrap(), [None]);
     }
