@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use super::sample::Sample;
-use crate::settings::EstimatorKind;
+use crate::settings::{Assurance, EstimatorKind};
 use lanesweep_model::driver::ModelId;
 use lanesweep_report::lanes::table_format;
 use lanesweep_run::sampling::{Estimator, SampleHeadways, SampleOptions, read_proposal};
@@ -53,9 +53,11 @@ impl Sample {
             SampleHeadways::Each(list) => models.len() * list.len(),
             SampleHeadways::Sampled => models.len(),
         };
-        let crude = self.settings.crude_lanes.div_ceil(lanes.max(1) as u64);
+        let is_bounded = self.settings.assurance == Assurance::Draws;
+        let most = if is_bounded { self.settings.crude_lanes } else { SEARCH_CRUDE };
+        let crude = most.div_ceil(lanes.max(1) as u64);
         let is_slow = models.iter().any(|model| model.foreign().is_some());
-        Search { crude: if is_slow { crude.min(DRIVER_CRUDE) } else { crude }, ..Search::default() }
+        Search { crude: if is_slow { crude.min(DRIVER_CRUDE) } else { crude }, is_bounded, ..Search::default() }
     }
 
     fn estimator(&self, density: &DensityModel) -> Result<Estimator> {
@@ -81,6 +83,8 @@ const DEFAULT_SAMPLES: u64 = 100_000;
 const CRUDE_PER_DRAW: u64 = 10;
 /// Maximum number of crude draws of a search with a driver outside the registry.
 const DRIVER_CRUDE: u64 = 1 << 15;
+/// Maximum number of lanes of the density in a search that is not bounded.
+const SEARCH_CRUDE: u64 = 20_000;
 /// Maximum number of draws of importance sampling after a search, if none is given.
 const MAX_DRAWS: u64 = 10_000_000;
 
@@ -118,6 +122,11 @@ impl Sample {
                 problem,
                 format!("leave out the stop rules, or {}", option("shard")),
             ));
+        }
+        if settings.assurance == Assurance::Search && (is_crude && !self.is_refined() || self.proposal.is_some()) {
+            let problem = "without importance sampling there is no search";
+            let help = format!("add {} or {}", option("half_width"), option("estimator = is"));
+            return Err(Error::usage(Place::option("assurance"), problem, help));
         }
         if self.proposal.is_some() && settings.estimator != EstimatorKind::Is {
             let problem = "a given proposal is sampled by importance sampling";

@@ -298,6 +298,21 @@ fn p_at_both_ends_of_the_bandwidths_interval_is_that_of_the_density_there_by_eit
     }
 }
 
+#[test]
+fn a_search_alone_finds_the_same_probability_with_few_lanes_and_never_calls_it_sound() {
+    let dir = folder();
+    let base = "-q sample density.json --thw 2 --models FSM --backend cpu --estimator is --half-width 0.2";
+    let text = ran(dir.path(), &format!("{base} --assurance search --out search"));
+    assert!(text.contains("not bounded"), "{text}");
+    ran(dir.path(), &format!("{base} --out draws"));
+    let [alone, bounded] = ["search", "draws"].map(|of| table(&dir.path().join(of).join("estimates.csv")).remove(0));
+    let number = |row: &BTreeMap<String, String>, column: &str| row[column].parse::<f64>().unwrap();
+    assert_eq!((&*alone["draws"], &*bounded["draws"]), ("searched", "sound"));
+    assert!(number(&alone, "runs") < 60_000.0 && number(&alone, "crude_fraction") == 0.0, "{alone:?}");
+    assert!(number(&alone, "draws_low") < number(&bounded, "draws_high"), "{alone:?} {bounded:?}");
+    assert!(number(&alone, "draws_high") > number(&bounded, "draws_low"), "{alone:?} {bounded:?}");
+}
+
 /// The density over the first scenarios only, scale and bandwidth held.
 fn of_few(density: &DensityModel, scenarios: usize) -> DensityModel {
     let kde = &density.kde;
@@ -382,6 +397,7 @@ fn bad_input_is_told_with_its_place_and_what_to_do() {
     for (args, code, said) in [
         ("@ --estimator is --samples 300000000000000", 2, "at least 1 and at most 281474976710655"),
         ("@ --estimator is --time-limit 3", 2, "belongs to crude Monte Carlo"),
+        ("@ --estimator mc --assurance search", 2, "there is no search"),
         ("@ --samples 0", 2, "--samples: `0` cannot be used"),
         ("@ --samples 2000000000000000000", 2, "more than can be counted"),
         ("@ --thw -1", 2, "not a time headway"),

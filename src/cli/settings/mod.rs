@@ -15,4 +15,4 @@ pub(crate) use keys::{DEFAULT_FILE, DEFAULT_FILE_NAME, KeyFlag, keys_in_order, t
 pub use keys::{Key, KeyKind};
 pub(crate) use layers::{Assignment, Layers, Origin, Setting};
 pub(crate) use schema::{profile_schema, settings_schema};
-pub(crate) use tables::{EstimatorKind, KeepPlan, MapSettings, SampleSettings, Settings};
+pub(crate) use tables::{Assurance, EstimatorKind, KeepPlan, MapSettings, SampleSettings, Settings};

@@ -13,7 +13,7 @@ use super::{Sample, Weighted};
 use crate::parts::{Ledger, MergeableCounts};
 use lanesweep_engine::{CpuBackend, Executor, lanes_within_seconds};
 use lanesweep_stats::estimate::{
-    BlockSums, Estimate, Found, Importance, Search, WeightSums, from_weight_sums, importance_sums, search,
+    BlockSums, Estimate, Found, Importance, Search, Warning, WeightSums, from_weight_sums, importance_sums, search,
 };
 use lanesweep_support::cancel::Cancel;
 use lanesweep_support::{Error, Place, Result};
@@ -68,7 +68,8 @@ impl Sample {
     /// The final draws after a search.
     pub(super) fn draws_after(&self, found: &[Found], search: &Search) -> Importance {
         let options = &self.options;
-        let draws = options.goal(search.crude).draws(found, options.seed, options.level);
+        let draws =
+            options.goal(if search.is_bounded { search.crude } else { 0 }).draws(found, options.seed, options.level);
         match options.stop.relative_half_width {
             Some(_) => draws,
             None => draws.with_draws(options.stop.samples),
@@ -133,7 +134,8 @@ impl Sample {
         let mut rows = Vec::new();
         let searched = weighted.search.as_ref().map_or(0, |search| search.points);
         for (((question, _), estimate), shares) in tally.sums.iter().zip(estimates).zip(&shares) {
-            let estimate = estimate.after_search(searched);
+            let mut estimate = estimate.after_search(searched);
+            estimate.trust.warn_if(weighted.draws.crude_per_draw == 0, Warning::NotBounded);
             let headway = options.headway_name(question.headway);
             let with = shares.as_ref().map(|of| {
                 let carriers = of.carriers.clone();

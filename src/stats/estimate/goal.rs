@@ -23,7 +23,7 @@ pub struct Goal {
     pub half_width: f64,
     /// Maximum number of final draws of the proposal.
     pub max_draws: u64,
-    /// Maximum number of final draws of the density.
+    /// Maximum number of final draws of the density; with 0 nothing bounds what the search missed.
     pub max_crude: u64,
 }
 
@@ -48,6 +48,7 @@ impl Goal {
             false => CRUDE_WITHOUT_FAILURE,
         };
         let crude = found.iter().map(crude).fold(0.0, f64::max).min(self.max_crude as f64);
-        Importance { seed, draws, crude_per_draw: ((crude / draws as f64).ceil() as u64).max(1) }
+        let least = u64::from(self.max_crude > 0);
+        Importance { seed, draws, crude_per_draw: ((crude / draws as f64).ceil() as u64).max(least) }
     }
 }

@@ -36,7 +36,8 @@ impl Importance {
     /// The same draws of the density beside another number of draws of the proposal.
     pub fn with_draws(self, draws: u64) -> Importance {
         let crude = self.crude_per_draw.saturating_mul(self.draws);
-        Importance { draws, crude_per_draw: crude.div_ceil(draws.max(1)).max(1), ..self }
+        let least = self.crude_per_draw.min(1);
+        Importance { draws, crude_per_draw: crude.div_ceil(draws.max(1)).max(least), ..self }
     }
 
     /// The weight 1/(m + g/f) of a failing draw of the density f or of the proposal g, with m draws of f for each of g.

@@ -68,11 +68,13 @@ pub struct Search {
     pub crude: u64,
     /// Draws of the sample that tests a proposal.
     pub test: u64,
+    /// Whether draws of the density bound what the search missed.
+    pub is_bounded: bool,
 }
 
 impl Default for Search {
     fn default() -> Self {
-        Search { batch: 2000, elite: 200.0, rounds: 50, crude: 100_000_000, test: 4000 }
+        Search { batch: 2000, elite: 200.0, rounds: 50, crude: 100_000_000, test: 4000, is_bounded: true }
     }
 }
 

@@ -71,6 +71,8 @@ pub enum Warning {
         /// Upper end of the interval of what no draw of the density met.
         bound: f64,
     },
+    /// No draws of the density bound what a search missed.
+    NotBounded,
     /// More than `Warning::MAX_VOID_FRACTION` of the indices gave no valid point.
     VoidDraws {
         /// Fraction of void indices.
@@ -171,6 +173,7 @@ impl fmt::Display for Warning {
                 "failures of a probability up to {} may have been missed: more draws of the density would tell",
                 significant(*bound, 2)
             ),
+            Warning::NotBounded => write!(f, "searched, not bounded: nothing tells what the search missed"),
             Warning::VoidDraws { share } => {
                 write!(f, "{:.2} % of the draws gave no valid point", 100.0 * share)
             }
@@ -199,6 +202,8 @@ enum Uncertain {
 pub enum Verdict {
     /// No warning: the interval of the draws holds P of the density as often as its level says.
     Sound,
+    /// No warning but that a search alone found the failures.
+    Searched,
     /// Warnings, none of them grave.
     Doubtful,
     /// A grave warning.
@@ -209,6 +214,7 @@ impl fmt::Display for Verdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Verdict::Sound => "sound",
+            Verdict::Searched => "searched",
             Verdict::Doubtful => "doubtful",
             Verdict::Unusable => "unusable",
         })
@@ -227,8 +233,10 @@ impl Trust {
     pub fn draws(&self) -> Verdict {
         if self.of(Uncertain::Draws).any(Warning::is_grave) {
             Verdict::Unusable
-        } else if self.of(Uncertain::Draws).next().is_some() {
+        } else if self.of(Uncertain::Draws).any(|warning| *warning != Warning::NotBounded) {
             Verdict::Doubtful
+        } else if self.of(Uncertain::Draws).next().is_some() {
+            Verdict::Searched
         } else {
             Verdict::Sound
         }
@@ -269,7 +277,11 @@ impl Trust {
             (None, "differs") => "recordings differ".to_owned(),
             _ => "density's rate".to_owned(),
         };
-        if self.draws() == Verdict::Sound { whose } else { whose + ", few draws" }
+        match self.draws() {
+            Verdict::Sound => whose,
+            Verdict::Searched => whose + ", not bounded",
+            _ => whose + ", few draws",
+        }
     }
 
     fn of(&self, about: Uncertain) -> impl Iterator<Item = &Warning> {
@@ -331,6 +343,11 @@ mod tests {
             (Verdict::Sound, "open", "bandwidth decides".to_owned())
         );
         assert_eq!(of(vec![Warning::FewFailures { failures: 3 }]).draws(), Verdict::Doubtful);
+        let searched = of(vec![Warning::NotBounded]);
+        assert_eq!(
+            (searched.draws(), searched.usable()),
+            (Verdict::Searched, "recordings' rate, not bounded".to_owned())
+        );
         assert_eq!(of(vec![Warning::OneWeightDominates { share: 0.3 }]).draws(), Verdict::Doubtful);
         assert_eq!(
             of(vec![Warning::NoFailures, Warning::OneWeightDominates { share: 0.7 }]).draws(),
