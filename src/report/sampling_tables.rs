@@ -134,9 +134,10 @@ impl SampleReport {
                 match warning {
                     Warning::FewScenarios { scenarios } => {
                         few.push(*scenarios);
-                        let carriers = row.carriers.iter().map(|carrier| {
-                            format!("{} % {}", significant(100.0 * carrier.of.fraction, 2), carrier_name(carrier))
-                        });
+                        let carriers =
+                            row.carriers.iter().filter(|carrier| carrier.of.fraction > 0.01).map(|carrier| {
+                                format!("{} % {}", significant(100.0 * carrier.of.fraction, 2), carrier_name(carrier))
+                            });
                         most.get_or_insert(format!("{}: {}", name(row), carriers.collect::<Vec<_>>().join(", ")));
                     }
                     // The rule tells it of all rows.

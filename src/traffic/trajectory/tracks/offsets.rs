@@ -55,7 +55,10 @@ impl Understanding {
                     let below = |d_m: f64| sorted.partition_point(|other| *other < d_m);
                     let is_alone = |d_m: f64| below(d_m + BESIDE_M) == below(d_m - BESIDE_M);
                     let number = of.iter().filter(|(_, d_m)| is_alone(*d_m)).count();
-                    number >= MIN_VEHICLES && number as f64 > MAX_ALONE * of.len() as f64
+                    // Few others are not on every lane.
+                    others.len() >= 4 * MIN_VEHICLES
+                        && number >= MIN_VEHICLES
+                        && number as f64 > MAX_ALONE * of.len() as f64
                 };
                 alone(before, after) || alone(after, before)
             };
