@@ -137,7 +137,7 @@ def test_a_check_has_its_answer_as_status() -> None:
 def test_errors_are_exceptions_with_place_and_help(tmp_path) -> None:
     with pytest.raises(lanesweep.UsageError, match="no driver model `FSN`") as raised:
         lanesweep.study(synth_recordings=1, models="FSN")
-    assert raised.value.exit_code == 2 and "use one of" in raised.value.help
+    assert raised.value.exit_code == 2 and "did you mean `FSM`?" in raised.value.help
     with pytest.raises(lanesweep.LanesweepError, match="nothing-here"):
         lanesweep.study(tmp_path / "nothing-here")
     bad = tmp_path / "bad.jsonl"

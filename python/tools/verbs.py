@@ -18,7 +18,7 @@ FUNCTIONS = ["study", "tracks", "mine", "fit", "sample", "map", "check", "trace"
 NAMES = {
     "categories": "Categories", "category": "Category", "compare": "Keys | bool", "config": "Config", "criterion": "Criterion",
     "device": "str | Int", "external": "Paths | Mapping[str, Any]", "lane": "Values", "models": "Models",
-    "panel": "Values", "parameterizations": "Keys", "paths": "Paths", "profiles": "Paths", "proposal": "Paths",
+    "panel": "Values", "parameterizations": "Keys", "paths": "Paths", "profiles": "Paths", "proposal": "Path",
     "scenarios": "Path | Table", "set": "Values", "thw": "Headways",
 }  # fmt: skip
 #: Types of arguments, by the names of their values on the command line.
