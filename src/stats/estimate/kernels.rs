@@ -5,8 +5,8 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::importance::{Importance, weighted_failures};
-use super::interval::log_normal;
 use super::limit_state::{Density, LimitState, purpose};
+use super::ratio::of_clusters;
 use super::summary::Estimate;
 use super::warnings::Warning;
 use crate::density::Mixture;
@@ -49,6 +49,8 @@ pub struct KernelShares {
     pub effective_failing: f64,
     /// Those that carry most.
     pub carriers: Vec<Carrier>,
+    /// All kernels.
+    pub kernels: usize,
 }
 
 /// Counts the fractions of every question over draws of a proposal and about `crude` draws of the density beside them. Each
@@ -113,7 +115,7 @@ impl Counts {
         let of_squares = (between / pairs).clamp(1.0 / n as f64, 1.0);
         let relative_variance = n as f64 / (n as f64 - 1.0) * (of_squares - 1.0 / n as f64);
         let carriers = Carrier::most(self.sums.iter().map(|[sum, _]| *sum));
-        Some(KernelShares { relative_variance, effective_failing: 1.0 / of_squares, carriers })
+        Some(KernelShares { relative_variance, effective_failing: 1.0 / of_squares, carriers, kernels: n })
     }
 }
 
@@ -128,7 +130,8 @@ impl Estimate {
             self.coefficient_of_variation = self.variance.sqrt() / p;
             let failures = self.weights.map_or(f64::INFINITY, |w| w.effective_failures);
             let freedom = failures.min(scenarios) - 1.0;
-            self.interval = log_normal(p, self.coefficient_of_variation, freedom, own.level);
+            let ends = [shares.kernels as f64, f64::INFINITY];
+            self.interval = of_clusters(p, self.variance, freedom, ends, own.level);
             self.interval.low = self.interval.low.min(own.low);
             self.interval.high = self.interval.high.max(own.high);
             self.relative_half_width = self.interval.relative_half_width(p);

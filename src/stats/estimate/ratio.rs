@@ -77,17 +77,19 @@ pub fn cluster_rate(clusters: Clusters, level: f64) -> ClusterRate {
         rule_of_three(min_effective as u64, level)
     } else {
         let freedom = effective_failing.min(effective_number(passed)) - 1.0;
-        let factor = student_factor(freedom, level);
-        let effective = rate * (1.0 - rate) / variance * factor * factor;
-        // With variance 0, only the number of clusters bounds the rate.
-        let effective = if variance > 0.0 {
-            effective.clamp(min_effective, (total as f64).max(min_effective))
-        } else {
-            min_effective
-        };
-        Interval { kind: IntervalKind::Clusters, ..wilson(rate * effective, effective, level) }
+        of_clusters(rate, variance, freedom, [min_effective, total as f64], level)
     };
     ClusterRate { rate, variance, interval, effective_failing }
+}
+
+/// Wilson's interval of a rate with the effective number of runs between `ends`, as of [`cluster_rate`].
+pub(super) fn of_clusters(rate: f64, variance: f64, freedom: f64, ends: [f64; 2], level: f64) -> Interval {
+    let [least, most] = ends;
+    let factor = student_factor(freedom, level);
+    let effective = rate * (1.0 - rate) / variance * factor * factor;
+    // With variance 0, only the number of clusters bounds the rate.
+    let effective = if variance > 0.0 { effective.clamp(least, most.max(least)) } else { least };
+    Interval { kind: IntervalKind::Clusters, ..wilson(rate * effective, effective, level) }
 }
 
 /// Verdict on the numerator of a ratio.
