@@ -123,11 +123,6 @@ impl Sample {
                 format!("leave out the stop rules, or {}", option("shard")),
             ));
         }
-        if settings.assurance == Assurance::Search && (is_crude && !self.is_refined() || self.proposal.is_some()) {
-            let problem = "without importance sampling there is no search";
-            let help = format!("add {} or {}", option("half_width"), option("estimator = is"));
-            return Err(Error::usage(Place::option("assurance"), problem, help));
-        }
         if self.proposal.is_some() && settings.estimator != EstimatorKind::Is {
             let problem = "a given proposal is sampled by importance sampling";
             return Err(Error::usage(Place::option("proposal"), problem, format!("add {}", option("estimator = is"))));

@@ -279,7 +279,7 @@ impl Trust {
         };
         match self.draws() {
             Verdict::Sound => whose,
-            Verdict::Searched => whose + ", not bounded",
+            _ if self.warnings.contains(&Warning::NotBounded) => whose + ", not bounded",
             _ => whose + ", few draws",
         }
     }
