@@ -67,19 +67,26 @@ def main(program, seeds):
 
 
 def report(path):
-    """Per recordings and parameterization: P over the truth, and how often the interval holds it."""
+    """A row per parameterization: median of P over the truth, tenths, and how often the interval over scenarios holds it."""
     groups = {}
     for row in table(path):
         truth = int(row["truth_failures"]) / int(row["truth_runs"])
-        p, low, high, narrow, wide = (float(row[c] or "nan") for c in list(row)[7:])
-        held = low <= truth <= high
-        with_bandwidth = min(low, narrow, wide) <= truth <= max(high, narrow, wide)
-        groups.setdefault((int(row["recordings"]), row["variant"]), []).append((p / truth, held, with_bandwidth))
-    for (recordings, variant), of in sorted(groups.items()):
-        ratios = sorted(ratio for ratio, _, _ in of)
-        ends = [ratios[math.floor(q * (len(ratios) - 1))] for q in (0.1, 0.9)]
-        held, with_bandwidth = (100 * statistics.mean(row[k] for row in of) for k in (1, 2))
-        print(f"| {recordings} | {variant} | {statistics.median(ratios):.2f} ({ends[0]:.2f} … {ends[1]:.2f}) | {held:.0f} % | {with_bandwidth:.0f} % |")
+        ends = [float(row[column]) for column in ("low", "high")]
+        bandwidth = [float(row[column]) for column in ("probability_narrow", "probability_wide")]
+        held = [min(of) <= truth <= max(of) for of in (ends, ends + bandwidth)]
+        groups.setdefault((row["variant"], int(row["recordings"])), []).append((float(row["probability"]) / truth, held))
+
+    def cell(of):
+        ratios = sorted(ratio for ratio, _ in of)
+        low, high = (ratios[math.floor(q * (len(ratios) - 1))] for q in (0.1, 0.9))
+        held, with_bandwidth = (f"{100 * statistics.mean(row[k] for _, row in of):.0f} %" for k in (0, 1))
+        more = "" if held == with_bandwidth else f" ({with_bandwidth} with the bandwidth's)"
+        return f"{statistics.median(ratios):.2f} ({low:.2f}–{high:.2f}), {held}{more}"
+
+    print("| cut-in |", " | ".join(f"{recordings} recordings" for recordings in RECORDINGS), "|")
+    for variant in sorted({variant for variant, _ in groups}):
+        cells = (cell(groups[variant, recordings]) for recordings in RECORDINGS if (variant, recordings) in groups)
+        print(f"| {variant} |", " | ".join(cells), "|")
 
 
 if __name__ == "__main__":
