@@ -14,7 +14,7 @@ use crate::settings::{
 use lanesweep_model::profile::Profile;
 use lanesweep_report::records::document;
 use lanesweep_support::files::write_atomically;
-use lanesweep_support::plain_text::quoted_word;
+use lanesweep_support::plain_text::{nearest, quoted_word};
 use lanesweep_support::{Error, Place, Result};
 
 /// Configurations, completions for your shell, manual pages
@@ -128,6 +128,12 @@ impl Init {
         }
         let is_profile = |name: &str| self.file.file_stem().is_some_and(|stem| stem == name);
         let profile = Profile::names().zip(Profile::files()).find(|(name, _)| is_profile(name));
+        let stem = self.file.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        if let Some(near) = nearest(&stem, Profile::names(), 0.85).filter(|_| profile.is_none()) {
+            let help =
+                format!("did you mean `{near}.toml`, a copy of that profile? Else choose a name that is not like it");
+            return Err(Error::usage(Place::file(&self.file), "this is not the name of a profile", help));
+        }
         let (flag, text) = profile.map_or(("config", DEFAULT_FILE), |(_, text)| ("profile", text));
         write_atomically(&self.file, text.as_bytes())?;
         let file = self.file.display().to_string();

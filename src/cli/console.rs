@@ -8,7 +8,7 @@ use std::io::{self, IsTerminal, Write};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use clap::error::{ContextValue, ErrorKind};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle, WeakProgressBar};
 use tracing::{Level, Metadata};
 use tracing_subscriber::fmt::MakeWriter;
@@ -308,13 +308,24 @@ pub(super) fn refuse(error: &clap::Error) -> Result<Exit> {
     let one_line = |part: &str| part.split_whitespace().collect::<Vec<_>>().join(" ");
     let parts: Vec<String> = safe.split("\n\n").map(one_line).collect();
     let after = |words: &'static str| parts.iter().filter_map(move |part| part.strip_prefix(words));
-    let tips = after("tip: ").map(str::to_owned);
+    // A flag of another verb is no value.
+    let tips = after("tip: ").filter(|tip| !tip.starts_with("to pass '")).map(str::to_owned);
+    let wrong = error.get(ContextKind::InvalidArg).map(ToString::to_string).unwrap_or_default();
+    let verbs = if error.kind() == ErrorKind::UnknownArgument { verbs_with(&wrong) } else { Vec::new() };
+    let of_verbs = (!verbs.is_empty()).then(|| format!("{wrong} belongs to {}", verbs.join(", ")));
     let usage = after("Usage: ").map(|usage| format!("usage: {usage}"));
     let more = after("For more information, ").map(|more| more.trim_end_matches('.').to_owned());
-    let help: Vec<String> = tips.chain(usage).chain(more).collect();
+    let help: Vec<String> = of_verbs.into_iter().chain(tips).chain(usage).chain(more).collect();
     let problem = after("error: ").next().unwrap_or(&safe);
     complain(&Error::usage(Place::item("lanesweep"), problem, help.join("\n")));
     Ok(Exit::Usage)
+}
+
+/// The verbs with a flag that another verb has not.
+fn verbs_with(flag: &str) -> Vec<String> {
+    let Some(flag) = flag.strip_prefix("--") else { return Vec::new() };
+    let has = |verb: &&clap::Command| verb.get_arguments().any(|arg| arg.get_long() == Some(flag));
+    super::configured::command().get_subcommands().filter(has).map(|verb| verb.get_name().to_owned()).collect()
 }
 
 /// Adapts a library error for miette.

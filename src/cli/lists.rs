@@ -114,6 +114,7 @@ pub(super) struct HeadwaysFlag {
     /// ego's speed; a list may contain it. observed: each scenario starts from its recorded gap, and a density draws
     /// the headway as one more parameter; it cannot be combined with other headways.
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "paper", help_heading = "Scenario")]
+    #[arg(allow_negative_numbers = true)]
     thw: Vec<String>,
 }
 
@@ -207,7 +208,14 @@ pub(super) fn headways(list: &[String]) -> Result<Vec<Headway>> {
         if Headway::parse(text.trim()) == Some(Headway::MinFollowing) {
             return Ok(Headway::MinFollowing);
         }
-        let value = text.trim().parse::<f64>().ok().filter(|v| v.is_finite() && *v > 0.0 && *v < 1e4);
+        let text = text.trim();
+        let value = text
+            .strip_suffix('s')
+            .unwrap_or(text)
+            .trim_end()
+            .parse::<f64>()
+            .ok()
+            .filter(|v| v.is_finite() && *v > 0.0 && *v < 1e4);
         if let Some(value) = value.filter(|value| !Quantity::Headway.is_plausible(*value)) {
             tracing::warn!("{}: {} (used as it is)", option("thw"), Quantity::Headway.describe(value));
         }

@@ -136,6 +136,6 @@ pub(super) fn guard(table: &Path, flag: &'static str, out: &Path, other: Option<
     let results = ["estimate.json", "estimates.csv", "convergence.csv", "density.json"];
     let others: Vec<PathBuf> = results.iter().map(|name| out.join(name)).chain(other.cloned()).collect();
     super::source::refuse_overwriting(table, &others, flag)?;
-    table_format(table)?;
+    table_format(table, flag)?;
     lanesweep_support::files::check_output(table)
 }

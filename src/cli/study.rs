@@ -231,7 +231,7 @@ impl Study {
         let results = results.into_iter().chain([PLAN_FILE, RUN_PLAN_FILE]);
         let others: Vec<PathBuf> = results.map(|name| self.out.join(name)).collect();
         source::refuse_overwriting(lanes, &others, "rows")?;
-        table_format(lanes)?;
+        table_format(lanes, "rows")?;
         check_output(lanes)
     }
 }

@@ -269,7 +269,7 @@ impl Doubts {
             ));
         }
         let [all, small] = self.boxes;
-        if all > 4 && 2 * small >= all {
+        if all > 1 && 2 * small >= all {
             let ((long_m, wide_m), of) = (SMALL_CAR_M, readable::count(all));
             list.push(format!(
                 "at least half of {of} vehicles are shorter than {long_m} m and narrower than {wide_m} m: are these half extents?"

@@ -166,6 +166,11 @@ impl CaseSheet<'_> {
             .build()
     }
 
+    /// Where the case comes from, on a line before it; nothing for a case of flags.
+    fn source(&self) -> String {
+        if self.identity.file_sha256.is_some() { format!("{}:\n", self.origin) } else { String::new() }
+    }
+
     /// The answer on one screen.
     pub fn brief(&self) -> String {
         let synthetic = if self.is_synthetic { "SYNTHETIC DATA: " } else { "" };
@@ -173,8 +178,9 @@ impl CaseSheet<'_> {
         let sentences = sentences.map(|sentence| format!("  {}\n", wrap(&sentence, WIDTH - 2).replace('\n', "\n  ")));
         let [drivers, _] = self.drivers_by_profile();
         format!(
-            "{synthetic}{}\n{}\n{}{}Where another answer begins, all else equal; the last columns: another collision\n{}\
+            "{synthetic}{}{}\n{}\n{}{}Where another answer begins, all else equal; the last columns: another collision\n{}\
              Other profiles, clauses, readings and hashes: {}, or a page to print: {}\n",
+            self.source(),
             self.case(),
             self.answer(),
             sentences.collect::<String>(),
@@ -198,7 +204,8 @@ impl CaseSheet<'_> {
         let sentences = self.demand().into_iter().chain(self.silent()).chain(cautions);
         let demand: Vec<String> = sentences.map(|sentence| format!("  {sentence}\n")).collect();
         format!(
-            "{synthetic}{}\n{}\n{}{}\n{}\n{}\nClauses under {}\n{}\n{}\n{}\n{}",
+            "{synthetic}{}{}\n{}\n{}{}\n{}\n{}\nClauses under {}\n{}\n{}\n{}\n{}",
+            self.source(),
             self.case(),
             self.answer(),
             demand.concat(),

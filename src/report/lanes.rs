@@ -38,12 +38,12 @@ pub fn sampled_table(path: &Path, sample: &Sample) -> Result<TableWriter> {
     create(path, "samples", (profile, plan_sha256), density.provenance.synthetic, sampled_columns(density))
 }
 
-/// The format of a table of lanes, from its file name.
+/// The format of a table of lanes, from the file name that a flag gives.
 ///
 /// # Errors
 /// [`Error::Usage`] for an unknown ending of the name.
-pub fn table_format(path: &Path) -> Result<TableFormat> {
-    TableFormat::of(path, &TableFormat::EVERY, &option("rows"))
+pub fn table_format(path: &Path, flag: &str) -> Result<TableFormat> {
+    TableFormat::of(path, &TableFormat::EVERY, &option(flag))
 }
 
 fn create(
@@ -54,7 +54,7 @@ fn create(
     columns: Vec<Column>,
 ) -> Result<TableWriter> {
     let metadata = TableMetadata { table, profile: Some(profile), plan_sha256, synthetic };
-    TableWriter::create(path, table_format(path)?, columns, &metadata)
+    TableWriter::create(path, table_format(path, "rows")?, columns, &metadata)
 }
 
 /// The columns of a study's lanes, in their order. `value` is the arithmetic of the numbers: binary32, or binary64 of

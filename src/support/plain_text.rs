@@ -111,7 +111,11 @@ pub fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>, min_li
     }
     let plain = |text: &str| text.trim().to_ascii_lowercase().replace(['_', '-', ' ', '.'], "");
     let wrong = plain(wrong);
-    let likeness = |name: &str| strsim::jaro_winkler(&wrong, &plain(name));
+    // The first knows no exchanged letters in short words.
+    let likeness = |name: &str| {
+        let name = plain(name);
+        strsim::jaro_winkler(&wrong, &name).max(strsim::normalized_damerau_levenshtein(&wrong, &name))
+    };
     let scored = names.into_iter().map(|name| (likeness(name), name)).filter(|&(likeness, _)| likeness > min_likeness);
     scored.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, name)| name)
 }

@@ -48,12 +48,13 @@ impl Understanding {
             of.sort_by_key(|(first_frame, _)| *first_frame);
             let changed = |parts: &usize| {
                 let (before, after) = of.split_at(parts * of.len() / 8);
-                // Vehicles beside none of the other part.
+                // Vehicles beside hardly any of the other part.
                 let alone = |of: &[(i64, f64)], others: &[(i64, f64)]| {
                     let mut sorted: Vec<f64> = others.iter().map(|(_, d_m)| *d_m).collect();
                     sorted.sort_by(f64::total_cmp);
                     let below = |d_m: f64| sorted.partition_point(|other| *other < d_m);
-                    let is_alone = |d_m: f64| below(d_m + BESIDE_M) == below(d_m - BESIDE_M);
+                    // Vehicles that change lanes are between them on average.
+                    let is_alone = |d_m: f64| 33 * (below(d_m + BESIDE_M) - below(d_m - BESIDE_M)) < others.len();
                     let number = of.iter().filter(|(_, d_m)| is_alone(*d_m)).count();
                     // Few others are not on every lane.
                     others.len() >= 4 * MIN_VEHICLES
