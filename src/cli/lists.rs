@@ -221,7 +221,7 @@ pub(super) fn headways(list: &[String]) -> Result<Vec<Headway>> {
         }
         value.map(Headway::thw).ok_or_else(|| {
             let problem = format!("`{text}` is not a time headway");
-            let near = nearest(text, ["r157", "paper", "observed"], 0.6);
+            let near = nearest(text, ["r157", "paper", "observed"], 0.6).filter(|_| !text.starts_with('-'));
             let near = near.map_or(String::new(), |near| format!("did you mean `{near}`? "));
             let help = "give seconds above 0 with commas, `r157`, `paper` or `observed`";
             Error::usage(Place::option("thw"), problem, near + help)
