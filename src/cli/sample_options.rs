@@ -123,6 +123,10 @@ impl Sample {
                 format!("leave out the stop rules, or {}", option("shard")),
             ));
         }
+        if self.proposal.is_some() && settings.assurance == Assurance::Search {
+            let problem = "a given proposal is not searched";
+            return Err(Error::usage(Place::option("assurance"), problem, "leave out one of the two"));
+        }
         if self.proposal.is_some() && settings.estimator != EstimatorKind::Is {
             let problem = "a given proposal is sampled by importance sampling";
             return Err(Error::usage(Place::option("proposal"), problem, format!("add {}", option("estimator = is"))));

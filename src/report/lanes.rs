@@ -179,7 +179,7 @@ fn sampled_columns(density: &DensityModel) -> Vec<Column> {
     columns.extend([
         c("kernel", ColumnKind::Whole, "1", "Kernel of the sample, from 0: the one that it was drawn from, or that explains a draw of a proposal best."),
         c("scenario", ColumnKind::Name, "", "Recorded scenario of the kernel; null where the density has none."),
-        c("weight", ColumnKind::Binary64, "1", "Weight of the lane in P, if it fails: P is the sum of weights over the number of draws (of a proposal, with those of the density beside)."),
+        c("weight", ColumnKind::Binary64, "1", "Weight of the lane in P, if it fails: P is the sum over the draws. With importance sampling the draws of the density beside are not listed; their part is `crude_fraction`."),
     ]);
     columns.extend(density.space.parameters().iter().map(|parameter| {
         let (name, unit) = (parameter.name.clone(), parameter.unit.clone());

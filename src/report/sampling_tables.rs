@@ -4,7 +4,9 @@
 use serde::Serialize;
 
 use super::sampling::{SampleReport, short};
-use lanesweep_run::sampling::{CarrierRow, Checkpoint, EstimateRow, RiskRate, TRAFFIC_DRAWS, Uncertainty};
+use lanesweep_run::sampling::{
+    BandwidthVerdict, CarrierRow, Checkpoint, EstimateRow, RiskRate, TRAFFIC_DRAWS, Uncertainty,
+};
 use lanesweep_stats::estimate::{Ratio, Warning, WeightFigures};
 use lanesweep_support::readable::{count, count_of, counted, significant};
 use lanesweep_support::table::{NamedValue, Table};
@@ -59,7 +61,7 @@ impl SampleReport {
             .columns(
                 [("probability_narrow", 0), ("probability_wide", 1)],
                 |(name, _)| name,
-                |row, (_, end)| row.at_bandwidths[end].and_then(|of| known(of.probability)),
+                |row, (_, end)| row.at_bandwidths[end].map(|of| of.probability).filter(|p| *p > 0.0),
             )
             .columns(weights, |(name, _)| name, |row, (_, of)| row.estimate.weights.as_ref().and_then(|w| known(of(w))))
             .columns(risks, |(end, _)| format!("{hour}{end}"), |row, (_, of)| per_hour(row).and_then(|r| known(of(&r))))
@@ -86,6 +88,7 @@ impl SampleReport {
             .column("draws", |row| row.estimate.trust.draws().to_string())
             .column("density", |row| row.estimate.trust.density())
             .column("scenarios", |row| row.estimate.trust.data())
+            .column("bandwidth", |row| row.bandwidth.map(BandwidthVerdict::key))
             .column("data", |_| self.density.provenance.data.as_str())
             .build()
             .csv()
@@ -184,29 +187,27 @@ impl SampleReport {
         rules.into_iter().flatten()
     }
 
-    /// How far the bandwidth changes the told rows; `None` if the density does not know its interval.
+    /// How far the bandwidth changes P; `None` if the density does not know its interval.
     fn bandwidth_rule(&self) -> Option<String> {
-        let told = || self.estimates.iter().filter(|row| row.is_told(&self.estimates));
-        let [Some(narrow), Some(wide)] = told().next()?.at_bandwidths else { return None };
+        let [Some(narrow), Some(wide)] = self.estimates.first()?.at_bandwidths else { return None };
         let [narrow, wide] = [narrow, wide].map(|of| significant(of.factor, 2));
-        let changes = |row: &EstimateRow| {
-            let is_of = |warning: &&Warning| matches!(warning, Warning::BandwidthDecides { .. });
-            row.estimate.trust.warnings.iter().find(is_of)?;
+        let of = |verdict| self.estimates.iter().filter(move |row| row.bandwidth == Some(verdict));
+        let change = |row: &EstimateRow| {
             let factors = row.at_bandwidths.iter().flatten().map(|of| of.probability / row.estimate.probability);
-            Some(factors.map(|factor| factor.max(1.0 / factor)).filter(|of| of.is_finite()).fold(1.0, f64::max))
+            factors.map(|factor| factor.max(1.0 / factor)).filter(|of| of.is_finite()).fold(1.0, f64::max)
         };
-        let changes: Vec<f64> = told().filter_map(changes).collect();
-        let (all, most) = (told().count(), significant(changes.iter().copied().fold(1.0, f64::max), 2));
-        Some(match changes.len() {
-            0 => format!(
-                "The bandwidth decides no row: at {narrow} and {wide} times the density's, the ends of its 95 % interval, P stays \
-                 within a quarter or chance"
-            ),
-            rows => format!(
-                "The bandwidth decides {rows} of {all} rows: at {narrow} and {wide} times the density's, the ends of its 95 % interval, \
-                 P changes by up to {most} times (`probability_narrow`, `probability_wide` in estimates.csv)"
-            ),
-        })
+        let most = of(BandwidthVerdict::Decides).map(change).fold(1.0, f64::max);
+        let [decided, open] = [BandwidthVerdict::Decides, BandwidthVerdict::Open].map(|verdict| of(verdict).count());
+        let all = self.estimates.len();
+        let decides = match decided {
+            0 => "no row".to_owned(),
+            _ => format!("{decided} of {all} rows, by up to {} times", significant(most, 2)),
+        };
+        let open = if open > 0 { format!("; {open} have too few failures there to tell") } else { String::new() };
+        Some(format!(
+            "The bandwidth decides {decides} (P at {narrow} and {wide} times the density's, the ends of its 95 % interval: \
+             estimates.csv){open}"
+        ))
     }
 
     /// What P over all headways averages; `None` for a single headway.

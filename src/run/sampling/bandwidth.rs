@@ -9,17 +9,44 @@ use super::sample_options::SampleOptions;
 use super::{Sample, SampleKind, Weighted};
 use lanesweep_engine::{CpuBackend, Executor};
 use lanesweep_stats::density::DensityModel;
-use lanesweep_stats::estimate::{Importance, StopRule, Warning, from_weight_sums, importance_sums};
+use lanesweep_stats::estimate::{Importance, StopRule, Warning, WeightSums, from_weight_sums, importance_sums};
 use lanesweep_support::Result;
 
-/// Maximum number of draws of the density, and of the proposal, at each end.
+/// Maximum number of draws of a proposal at each end, and of crude Monte Carlo …
 const DRAWS: u64 = 20_000;
+/// … unless this fraction of its samples is more.
+const FRACTION: u64 = 16;
 /// Maximum number of lanes of the density beside the draws of a proposal.
 const BESIDE_LANES: u64 = 1 << 20;
 /// Lanes of a driver outside the registry are thousands of times as slow, so that they are fewer.
 const FEWER: u64 = 16;
 /// Probabilities within this factor of one another agree, as in the comparison with recorded scenarios.
 const AGREE: f64 = 1.25;
+/// An interval that reaches beyond this factor does not tell whether they do.
+const TELLING: f64 = 2.0;
+
+/// What the interval of the bandwidth does to a probability.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BandwidthVerdict {
+    /// P differs at an end, beyond chance and by more than a quarter.
+    Decides,
+    /// Too few failures at an end to tell.
+    Open,
+    /// Neither.
+    Agrees,
+}
+
+impl BandwidthVerdict {
+    /// Name in files.
+    pub fn key(self) -> &'static str {
+        match self {
+            BandwidthVerdict::Decides => "decides",
+            BandwidthVerdict::Open => "open",
+            BandwidthVerdict::Agrees => "agrees",
+        }
+    }
+}
 
 /// A probability at another bandwidth, with the interval of its draws.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -36,9 +63,13 @@ pub struct AtBandwidth {
 
 impl AtBandwidth {
     /// Whether it is another probability than the one with this interval of its draws.
-    fn is_other(&self, probability: f64, [low, high]: [f64; 2]) -> bool {
+    fn verdict(&self, probability: f64, [low, high]: [f64; 2]) -> BandwidthVerdict {
         let factor = self.probability / probability;
-        (self.low > high || self.high < low) && !(1.0 / AGREE..=AGREE).contains(&factor)
+        if (self.low > high || self.high < low) && !(1.0 / AGREE..=AGREE).contains(&factor) {
+            return BandwidthVerdict::Decides;
+        }
+        let is_told = self.low * TELLING >= probability && self.high <= TELLING * probability && probability > 0.0;
+        if is_told { BandwidthVerdict::Agrees } else { BandwidthVerdict::Open }
     }
 }
 
@@ -52,10 +83,13 @@ impl Sample {
         let is_slow = self.options.models.iter().any(|model| model.foreign().is_some());
         let share = if is_slow { FEWER } else { 1 };
         for (end, value) in [likelihood.low, likelihood.high].into_iter().enumerate() {
-            let density = self.density.at_bandwidth(value)?;
+            // A kernel may be too wide for any valid draw.
+            let Ok(density) = self.density.at_bandwidth(value) else { continue };
             let factor = value / self.density.kde.bandwidth().value;
             let found = match &self.kind {
-                SampleKind::Crude(_) => self.crude_at(density, DRAWS / share)?,
+                SampleKind::Crude(_) => {
+                    self.crude_at(density, (self.options.stop.samples / FRACTION).max(DRAWS) / share)?
+                }
                 SampleKind::Weighted(weighted) => self.weighted_at(&density, weighted, share)?,
                 SampleKind::Search(_) => return Ok(result),
             };
@@ -65,9 +99,13 @@ impl Sample {
         }
         for row in &mut result.rows {
             let [Some(narrow), Some(wide)] = row.at_bandwidths else { continue };
-            let decides = [narrow, wide].iter().any(|of| of.is_other(row.estimate.probability, row.draws));
+            let verdicts = [narrow, wide].map(|of| of.verdict(row.estimate.probability, row.draws));
+            let has = |verdict| verdicts.contains(&verdict);
+            row.bandwidth = [BandwidthVerdict::Decides, BandwidthVerdict::Open, BandwidthVerdict::Agrees]
+                .into_iter()
+                .find(|of| has(*of));
             let warning = Warning::BandwidthDecides { narrow: narrow.probability, wide: wide.probability };
-            row.estimate.trust.warn_if(decides, warning);
+            row.estimate.trust.warn_if(has(BandwidthVerdict::Decides), warning);
         }
         Ok(result)
     }
@@ -91,7 +129,12 @@ impl Sample {
         let executor = Executor::new(&cpu);
         let lanes = LaneLimitState::new(density, &self.profile, &self.options.headways, &asked, executor);
         let sums = importance_sums(&nominal, &of.proposal, &lanes, &options, 0..draws)?;
-        let estimates = sums.iter().map(|of| from_weight_sums(&of.total().unwrap_or_default(), self.options.level));
-        Ok(estimates.map(|of| (of.probability, [of.interval.low, of.interval.high])).collect())
+        // The bound on what was missed is wider than the change of a rare probability.
+        let of_sums = |sums: WeightSums| {
+            let found = sums.interval_of_found(self.options.level);
+            let interval = if sums.failures > 0 { found } else { from_weight_sums(&sums, self.options.level).interval };
+            (sums.probability().min(1.0), [interval.low, interval.high])
+        };
+        Ok(sums.iter().map(|of| of_sums(of.total().unwrap_or_default())).collect())
     }
 }

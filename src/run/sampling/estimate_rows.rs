@@ -3,7 +3,7 @@
 
 use serde::Serialize;
 
-use super::bandwidth::AtBandwidth;
+use super::bandwidth::{AtBandwidth, BandwidthVerdict};
 use super::sample_options::SampleOptions;
 use super::uncertainty::Uncertainty;
 use lanesweep_engine::{LanePlan, SampleTally, cell_of};
@@ -52,6 +52,8 @@ pub struct EstimateRow {
     pub carriers: Vec<CarrierRow>,
     /// P at the lower and at the upper end of the interval of the density's bandwidth; none if the density does not know it.
     pub at_bandwidths: [Option<AtBandwidth>; 2],
+    /// What these say.
+    pub bandwidth: Option<BandwidthVerdict>,
 }
 
 /// Ratios of failure rates to that of S, over the same scenarios, headways, model and criterion.
@@ -129,6 +131,7 @@ impl EstimateRow {
             no_traffic: None,
             carriers: Vec::new(),
             at_bandwidths: [None; 2],
+            bandwidth: None,
         }
     }
 

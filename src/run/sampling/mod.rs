@@ -21,7 +21,7 @@ mod uncertainty;
 mod weighted;
 
 pub use against_recorded::TRAFFIC_DRAWS;
-pub use bandwidth::AtBandwidth;
+pub use bandwidth::{AtBandwidth, BandwidthVerdict};
 pub use cheaper_estimator::Choice;
 pub use crude::{Checkpoint, CheckpointRow, CrudeRun};
 pub use estimate_rows::{CarrierRow, EstimateRow, NoTraffic, RecordedRatios, Risk, RiskRate};

@@ -10,7 +10,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::bandwidth::Bandwidth;
+use super::bandwidth::{Bandwidth, BandwidthLikelihood};
 use super::json_rows::to_readable_json;
 use super::kde::Kde;
 use super::model::{DensityModel, EarlierFigures, Exposure, Provenance};
@@ -169,6 +169,14 @@ impl File {
         if !BANDWIDTHS.contains(&kde.bandwidth().value) {
             let problem =
                 format!("{:e}; expected {:e} to {}", kde.bandwidth().value, BANDWIDTHS.start(), BANDWIDTHS.end());
+            return wrong("bandwidth", problem);
+        }
+        let likelihood = kde.bandwidth().likelihood;
+        let is_interval = |of: BandwidthLikelihood| {
+            of.low <= of.best && of.best <= of.high && BANDWIDTHS.contains(&of.low) && BANDWIDTHS.contains(&of.high)
+        };
+        if likelihood.is_some_and(|of| !is_interval(of)) {
+            let problem = "low, best and high of its likelihood are no interval of bandwidths".to_owned();
             return wrong("bandwidth", problem);
         }
         let outside = kde.points().iter().enumerate().find_map(|(i, p)| Some((i, space.check(p).err()?)));

@@ -81,6 +81,12 @@ impl WeightSums {
         if self.crude > 0 {
             return gamma(probability.min(1.0), variance, 1.0 / self.crude as f64, level);
         }
+        self.interval_of_found(level)
+    }
+
+    /// The second of these intervals: of what was found, whatever may have been missed.
+    pub fn interval_of_found(&self, level: f64) -> Interval {
+        let (probability, variance) = (self.probability(), self.variance());
         if probability <= 0.0 || variance <= 0.0 {
             return Interval::nothing(level);
         }
