@@ -221,6 +221,8 @@ fn tables_that_are_not_whole_are_refused_with_what_is_missing() {
         let spoil = |t: &mut Texts| t.tracks_meta = with_field(&t.tracks_meta, 2, "numFrames", count);
         refused(spoil, &["vehicle 1", "has 8 frames", &format!("claims {count}")]);
     }
+    let shifted = |t: &mut Texts| t.tracks_meta = with_field(&t.tracks_meta, 3, "initialFrame", "77");
+    refused(shifted, &["vehicle 2", "begins at frame", "says 77, unlike for the first vehicle"]);
     // Without numFrames, first and last frame say how many there must be.
     let uncounted = |t: &Texts| (without_column(&t.tracks_meta, "numFrames"), without_line(&t.tracks, 27));
     refused(|t| (t.tracks_meta, t.tracks) = uncounted(t), &["vehicle 7", "has 4 frames", "claims 5"]);

@@ -39,6 +39,8 @@ pub(super) struct VehicleMeta {
     pub carriageway: usize,
     /// Required number of lines in `tracks`, if given.
     pub samples: Option<u64>,
+    /// Its first frame, if given.
+    pub first_frame: Option<i64>,
 }
 
 /// Reads `recordingMeta`.
@@ -259,6 +261,7 @@ impl MetaColumns {
             direction,
             carriageway,
             samples: self.samples(table)?,
+            first_frame: self.first_and_last_frame.map(|(first, _)| table.integer(first)).transpose()?,
         })
     }
 

@@ -285,7 +285,7 @@ fn check_counts(table: &CsvTable, vehicles: &[VehicleMeta], tracks: &[Track]) ->
         Some(samples) => samples != track.len() as u64,
         None => track.is_empty(),
     });
-    let Some((vehicle, track)) = mismatches.next() else { return Ok(()) };
+    let Some((vehicle, track)) = mismatches.next() else { return check_first_frames(table, vehicles, tracks) };
     let (found, more) = (track.len() as u64, mismatches.count());
     let expected = match vehicle.samples {
         Some(samples) => format!("the tracksMeta file claims {samples}"),
@@ -296,6 +296,24 @@ fn check_counts(table: &CsvTable, vehicles: &[VehicleMeta], tracks: &[Track]) ->
     Err(Error::input(
         table.file_place().of(format!("vehicle {}", vehicle.id)),
         format!("the vehicle has {found} frames, but {expected}{more}{truncated}"),
+        "copy or export the files again; check that the three belong to the same recording",
+    ))
+}
+
+/// Finds a vehicle whose track is shifted against the others: files may count from another first frame, but all alike.
+fn check_first_frames(table: &CsvTable, vehicles: &[VehicleMeta], tracks: &[Track]) -> Result<()> {
+    let shift = |(vehicle, track): (&VehicleMeta, &Track)| {
+        Some(track.first_frame - vehicle.first_frame?).filter(|_| !track.is_empty())
+    };
+    let usual = vehicles.iter().zip(tracks).find_map(shift);
+    let is_shifted = |of: &(&VehicleMeta, &Track)| usual.zip(shift(*of)).is_some_and(|(usual, own)| usual != own);
+    let Some((vehicle, track)) = vehicles.iter().zip(tracks).find(is_shifted) else { return Ok(()) };
+    let (found, told) = (track.first_frame, vehicle.first_frame.unwrap_or_default());
+    Err(Error::input(
+        table.file_place().of(format!("vehicle {}", vehicle.id)),
+        format!(
+            "the vehicle begins at frame {found}, but the tracksMeta file says {told}, unlike for the first vehicle"
+        ),
         "copy or export the files again; check that the three belong to the same recording",
     ))
 }
