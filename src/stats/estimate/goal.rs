@@ -32,9 +32,9 @@ impl Goal {
     pub const HALF_WIDTH: f64 = 0.1;
 
     /// Failures that the final draws of the density are expected to hold: one failure more or less moves the end of the
-    /// interval by half the half-width, and those that may be missed are less than half of P.
+    /// interval by a third of the half-width, and those that may be missed are less than half of P.
     pub fn crude_failures(half_width: f64) -> f64 {
-        (2.0 / half_width).max(8.0)
+        (3.0 / half_width).max(8.0)
     }
 
     /// The final draws after a search, for all questions together: the worst one decides.
