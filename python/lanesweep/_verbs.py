@@ -363,7 +363,7 @@ def sample(
         Stop at the first check after this time (not reproducible), by default no limit.
     assurance : Literal["draws", "search"]
         What importance sampling rests on. `draws` of the density bound what its search missed; the `search` alone costs
-        20,000 to 50,000 lanes a question, for drivers that take a millisecond a lane, and bounds nothing.
+        15,000 to 60,000 lanes a question, for drivers that take a millisecond a lane, and bounds nothing.
     rows : Path
         Also write one row per lane: .csv, .jsonl or .parquet.
     failures : Path

@@ -169,7 +169,7 @@ settings! {
         #[schemars(extend("x-flag" = "time_limit", "x-verbs" = ["sample"], "x-heading" = MODELS))]
         pub time_limit_s: Option<f64> = None,
         /// What importance sampling rests on. `draws` of the density bound what its search missed; the `search` alone costs
-        /// 20,000 to 50,000 lanes a question, for drivers that take a millisecond a lane, and bounds nothing.
+        /// 15,000 to 60,000 lanes a question, for drivers that take a millisecond a lane, and bounds nothing.
         #[schemars(extend("x-flag" = "assurance", "x-verbs" = ["sample"], "x-heading" = MODELS))]
         pub assurance: Assurance = Assurance::Draws,
         /// Lanes of each model and criterion in the table of failures, at most.

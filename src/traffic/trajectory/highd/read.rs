@@ -303,7 +303,7 @@ fn check_counts(table: &CsvTable, vehicles: &[VehicleMeta], tracks: &[Track]) ->
 /// Finds a vehicle whose track is shifted against the others: files may count from another first frame, but all alike.
 fn check_first_frames(table: &CsvTable, vehicles: &[VehicleMeta], tracks: &[Track]) -> Result<()> {
     let shift = |(vehicle, track): (&VehicleMeta, &Track)| {
-        Some(track.first_frame - vehicle.first_frame?).filter(|_| !track.is_empty())
+        Some(track.first_frame.saturating_sub(vehicle.first_frame?)).filter(|_| !track.is_empty())
     };
     let usual = vehicles.iter().zip(tracks).find_map(shift);
     let is_shifted = |of: &(&VehicleMeta, &Track)| usual.zip(shift(*of)).is_some_and(|(usual, own)| usual != own);
