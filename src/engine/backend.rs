@@ -37,7 +37,7 @@ pub struct Chunk {
 
 impl Chunk {
     /// Number of lanes with verdicts.
-    pub fn lanes(&self) -> u64 {
+    pub(crate) fn lanes(&self) -> u64 {
         self.verdicts.len() as u64
     }
 

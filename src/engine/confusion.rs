@@ -38,7 +38,7 @@ impl<N> From<Confusion<N>> for [N; 4] {
 
 impl Confusion<u32> {
     /// Counts one lane of S' against its lane of S.
-    pub fn count(&mut self, s: bool, s_prime: bool) {
+    pub(crate) fn count(&mut self, s: bool, s_prime: bool) {
         match (s, s_prime) {
             (true, true) => self.tp += 1,
             (true, false) => self.fn_ += 1,

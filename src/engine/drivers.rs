@@ -87,7 +87,7 @@ macro_rules! declare_constants {
             }
 
             /// The constants of a model by their names in its shader.
-            pub fn driver_shader_constants(&self, id: ModelId) -> Vec<(&'static str, f64)> {
+            pub(crate) fn driver_shader_constants(&self, id: ModelId) -> Vec<(&'static str, f64)> {
                 match id {
                     $(ModelId::$model => self.$file.shader_constants(),)+
                     ModelId::Foreign(_) => Vec::new(),

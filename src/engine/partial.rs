@@ -130,7 +130,7 @@ impl Partial {
     }
 
     /// The covered units as disjoint intervals, ascending.
-    pub fn covered(&self) -> Vec<Range<u64>> {
+    pub(crate) fn covered(&self) -> Vec<Range<u64>> {
         let mut intervals: Vec<Range<u64>> = Vec::new();
         for unit in self.units.iter().map(|u| u.unit) {
             match intervals.last_mut() {

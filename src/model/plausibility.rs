@@ -74,7 +74,7 @@ pub const LIMITS: [Limits; 11] = [
 ];
 
 /// An initial distance up to which every headway is plausible, m: a slow ego is many seconds behind a vehicle that is near.
-pub const NEAR_M: f64 = 100.0;
+pub(crate) const NEAR_M: f64 = 100.0;
 
 /// Length and width of which a usual car exceeds one, m.
 const SMALL_CAR_M: (f64, f64) = (3.3, 1.4);
@@ -99,7 +99,7 @@ pub enum Implausible {
 impl Quantity {
     /// The row of the table.
     #[inline]
-    pub fn limits(self) -> &'static Limits {
+    pub(crate) fn limits(self) -> &'static Limits {
         &LIMITS[self as usize]
     }
 
@@ -178,7 +178,7 @@ impl Doubts {
     }
 
     /// No doubts yet, with the same policy.
-    pub fn another(&self) -> Doubts {
+    pub(crate) fn another(&self) -> Doubts {
         Doubts::new(self.policy)
     }
 
@@ -202,7 +202,7 @@ impl Doubts {
     }
 
     /// Counts a value that another value contradicts; `text` has its place.
-    pub fn contradict(&mut self, quantity: Quantity, text: String) {
+    pub(crate) fn contradict(&mut self, quantity: Quantity, text: String) {
         self.found[quantity as usize].add(Finding { count: 1, first: text });
     }
 
@@ -221,7 +221,7 @@ impl Doubts {
 
     /// Notes a leader's acceleration. If no leader of many brakes by more than 1.2 m/s², it may be in g.
     #[inline]
-    pub fn note_leader(&mut self, acceleration_mps2: f64) {
+    pub(crate) fn note_leader(&mut self, acceleration_mps2: f64) {
         if acceleration_mps2 < 0.0 {
             self.leaders = (self.leaders.0 + 1, self.leaders.1.max(-acceleration_mps2));
         }
@@ -229,7 +229,7 @@ impl Doubts {
 
     /// Notes whether a vehicle that cuts in is faster than the ego. If all are, the two speeds may be exchanged.
     #[inline]
-    pub fn note_cutter(&mut self, is_faster: bool) {
+    pub(crate) fn note_cutter(&mut self, is_faster: bool) {
         self.cutters = [self.cutters[0] + 1, self.cutters[1] + u64::from(is_faster)];
     }
 
@@ -244,7 +244,7 @@ impl Doubts {
     }
 
     /// Adds the doubts of another input.
-    pub fn add(&mut self, other: Doubts) {
+    pub(crate) fn add(&mut self, other: Doubts) {
         self.still.add(other.still);
         self.leaders = (self.leaders.0 + other.leaders.0, self.leaders.1.max(other.leaders.1));
         let counts = self.boxes.iter_mut().chain(&mut self.cutters);

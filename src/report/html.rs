@@ -22,7 +22,7 @@ const NARROW_PX: f64 = 700.0;
 
 /// A figure with the names of its files beside the page.
 #[derive(Debug, Clone)]
-pub struct PageFigure {
+pub(crate) struct PageFigure {
     svg: String,
     files: Vec<String>,
     is_wide: bool,

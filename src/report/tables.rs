@@ -278,7 +278,7 @@ pub(super) fn paragraph(words: &str) -> String {
 }
 
 /// The text wrapped between words; a longer word stays whole.
-pub fn wrap(text: &str, width: usize) -> String {
+pub(crate) fn wrap(text: &str, width: usize) -> String {
     let mut lines = vec![String::new()];
     for word in text.split(' ') {
         let last = lines.len() - 1;

@@ -123,7 +123,7 @@ impl Source {
     ///
     /// # Errors
     /// [`Error::Io`](lanesweep_support::error::Error::Io).
-    pub fn scenarios_sha256(&self, collection: &Collection) -> Result<String> {
+    pub(crate) fn scenarios_sha256(&self, collection: &Collection) -> Result<String> {
         if let Source::Scenarios { path, .. } = self {
             return input_file::sha256(path);
         }

@@ -36,7 +36,7 @@ impl CountLayout {
     }
 
     /// Failed lanes: headway × model × criterion, the last innermost.
-    pub fn failures(&self) -> Range<usize> {
+    pub(crate) fn failures(&self) -> Range<usize> {
         Self::FAILURES..Self::FAILURES + self.lanes() * Criterion::ALL.len()
     }
 
@@ -65,12 +65,12 @@ impl CountLayout {
     }
 
     /// Number of counts that every sample may change; the others belong to a group.
-    pub fn of_every_sample(&self) -> usize {
+    pub(crate) fn of_every_sample(&self) -> usize {
         self.capped().end
     }
 
     /// Number of counts.
-    pub fn total(&self) -> usize {
+    pub(crate) fn total(&self) -> usize {
         self.kernel_failures().end
     }
 

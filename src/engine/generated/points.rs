@@ -106,7 +106,7 @@ impl Points {
     /// Draw `attempt` of an index, valid or not. Word 0 selects the component, word 1 is unused, the others are normal
     /// deviates.
     #[inline]
-    pub fn attempt(&self, index: u64, attempt: u32) -> [f32; MAX_PARAMETERS] {
+    pub(crate) fn attempt(&self, index: u64, attempt: u32) -> [f32; MAX_PARAMETERS] {
         let d = self.dimensions;
         let mut words = [0_u32; 4 * BLOCKS as usize];
         match &self.source {

@@ -65,7 +65,7 @@ impl NamedNumber {
     }
 
     /// Its row of [`NUMBERS`].
-    pub fn number(self) -> &'static CaseNumber {
+    pub(crate) fn number(self) -> &'static CaseNumber {
         &NUMBERS[self.at]
     }
 
@@ -116,7 +116,7 @@ impl CaseParameters {
     ///
     /// # Errors
     /// [`Error::Usage`] if it is missing or unknown.
-    pub fn category(&self) -> Result<Category> {
+    pub(crate) fn category(&self) -> Result<Category> {
         let text = self.category.as_ref().ok_or_else(|| missing("category"))?;
         Category::named(text, Place::item("category"))
     }
@@ -169,7 +169,7 @@ impl CaseParameters {
     ///
     /// # Errors
     /// [`Error::Usage`] that names what is missing or out of range.
-    pub fn plain_case(&self, length_m: f64, width_m: f64) -> Result<PlainCase> {
+    pub(crate) fn plain_case(&self, length_m: f64, width_m: f64) -> Result<PlainCase> {
         let category = self.category()?;
         let given = || NUMBERS.iter().filter_map(|number| Some((number, self[number.quantity]?)));
         // A lane has its width without lane changes too.

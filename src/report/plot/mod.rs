@@ -245,7 +245,7 @@ impl Figure {
     }
 
     /// The numbers of the series: one row per value.
-    pub(crate) fn csv(&self) -> String {
+    pub fn csv(&self) -> String {
         let series = self.plots.iter().flat_map(|plot| plot.series.iter().map(move |series| (plot, series)));
         let rows = series.flat_map(|(plot, series)| series.values.iter().map(move |value| (plot, series, value)));
         Table::of(rows)

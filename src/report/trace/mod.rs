@@ -138,7 +138,7 @@ const VEHICLES: [&str; 2] = ["other", "ahead"];
 /// The traces, one row per step. Several traces follow one another, named by a first column `lane`; a single trace has
 /// no such column. The last column names the marks of a step (`reaction`, `braking`, `contact`, joined by `+`).
 /// Infinity is `inf`; the columns of an absent vehicle are empty.
-pub fn table(traces: &[(String, &Trace)]) -> Table {
+pub(crate) fn table(traces: &[(String, &Trace)]) -> Table {
     let vehicles = traces.iter().map(|(_, trace)| trace.vehicles).max().unwrap_or(1);
     let rows = traces.iter().flat_map(|(name, trace)| trace.steps.iter().map(move |step| (name, *trace, step)));
     let mut table = Table::of(rows)

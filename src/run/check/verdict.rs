@@ -20,7 +20,7 @@ pub enum Answer {
 
 impl Answer {
     /// All, in the order of tables.
-    pub const ALL: [Answer; 4] = [Answer::Preventable, Answer::NotPreventable, Answer::NoConflict, Answer::Open];
+    pub(crate) const ALL: [Answer; 4] = [Answer::Preventable, Answer::NotPreventable, Answer::NoConflict, Answer::Open];
 
     /// The words of sheets and maps.
     pub fn label(self) -> &'static str {

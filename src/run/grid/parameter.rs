@@ -86,7 +86,7 @@ impl MapParameter {
     }
 
     /// A value in SI units.
-    pub fn si(&self, value: f64) -> f64 {
+    pub(crate) fn si(&self, value: f64) -> f64 {
         value / self.per_si
     }
 
@@ -114,7 +114,7 @@ impl MapParameter {
     ///
     /// # Errors
     /// [`Error::Usage`] with the range.
-    pub fn check(&self, value: f64, flag: &str) -> Result<f64> {
+    pub(crate) fn check(&self, value: f64, flag: &str) -> Result<f64> {
         let mut doubts = Doubts::default();
         let is_still = self.quantity.number().plausible == Some(Quantity::Speed)
             && !self.is_relative
@@ -140,7 +140,7 @@ pub struct Point {
 
 impl Point {
     /// Sets the quantity of a parameter from a value in the parameter's unit.
-    pub fn set(&mut self, parameter: &MapParameter, value: f64) {
+    pub(crate) fn set(&mut self, parameter: &MapParameter, value: f64) {
         let set =
             if parameter.is_relative { &mut self.relative_mps } else { &mut self.values[parameter.quantity as usize] };
         *set = Some(parameter.si(value));
@@ -148,7 +148,7 @@ impl Point {
 
     /// The same point with another value of a quantity, in SI units.
     #[must_use]
-    pub fn with(mut self, quantity: CaseQuantity, si: f64) -> Point {
+    pub(crate) fn with(mut self, quantity: CaseQuantity, si: f64) -> Point {
         self.values[quantity as usize] = Some(si);
         self
     }

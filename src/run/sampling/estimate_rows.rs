@@ -155,7 +155,7 @@ impl EstimateRow {
     }
 
     /// Half the width of the draws' interval over the probability, which more samples reduce; ∞ at zero.
-    pub fn draws_half_width(&self) -> f64 {
+    pub(crate) fn draws_half_width(&self) -> f64 {
         let [low, high] = self.draws;
         Interval { low, high, ..self.estimate.interval }.relative_half_width(self.estimate.probability)
     }
@@ -268,7 +268,7 @@ impl RiskRate {
 
 impl Risk {
     /// Risk of an estimate under an exposure.
-    pub(crate) fn of(estimate: &Estimate, exposure: Option<&Exposure>) -> Risk {
+    pub fn of(estimate: &Estimate, exposure: Option<&Exposure>) -> Risk {
         let product = |rate: Option<&Rate>, scale: f64| rate.map(|rate| RiskRate::of(rate, scale, estimate));
         Risk {
             per_hour: product(exposure.and_then(|e| e.per_hour.as_ref()), 1.0),

@@ -167,7 +167,7 @@ impl Sample {
     }
 
     /// Number of samples; before a search, and with a stop rule, the maximum.
-    pub(crate) fn samples(&self) -> u64 {
+    pub fn samples(&self) -> u64 {
         match &self.kind {
             SampleKind::Weighted(weighted) => weighted.draws.draws,
             _ => self.options.stop.samples,

@@ -146,7 +146,7 @@ impl CategoryScores {
     }
 
     /// Index of a variant by its name.
-    pub fn variant(&self, name: &str) -> Option<usize> {
+    pub(crate) fn variant(&self, name: &str) -> Option<usize> {
         self.variants.iter().position(|v| v == name)
     }
 }
@@ -239,7 +239,7 @@ settings! {
 
 impl ScoreOptions {
     /// Checks the ranges; the error names the option.
-    pub fn validate(&self) -> Result<()> {
+    pub(crate) fn validate(&self) -> Result<()> {
         ranges::check("score", self)
     }
 }

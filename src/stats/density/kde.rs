@@ -78,7 +78,7 @@ impl Kde {
     ///
     /// # Errors
     /// As [`Kde::from_parts`].
-    pub fn at_bandwidth(&self, value: f64) -> Result<Kde> {
+    pub(crate) fn at_bandwidth(&self, value: f64) -> Result<Kde> {
         let bandwidth = Bandwidth { value, likelihood: None, ..self.bandwidth };
         Kde::from_parts(self.points.clone(), self.scale.clone(), bandwidth)
     }

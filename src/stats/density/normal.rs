@@ -61,12 +61,12 @@ impl Draws {
     }
 
     /// Uniform in the open interval (0, 1).
-    pub fn uniform(&mut self) -> f64 {
+    pub(crate) fn uniform(&mut self) -> f64 {
         ((self.word64() >> 12) as f64 + 0.5) / (1u64 << 52) as f64
     }
 
     /// An integer in 0..n; probabilities are equal up to n/2⁶⁴.
-    pub fn below(&mut self, n: usize) -> usize {
+    pub(crate) fn below(&mut self, n: usize) -> usize {
         ((u128::from(self.word64()) * n as u128) >> 64) as usize
     }
 

@@ -235,7 +235,7 @@ pub(super) fn failing<L: LimitState + ?Sized>(
 pub(crate) const BATCH: u64 = 1 << 16;
 
 /// The draws of a range of indices, in order.
-pub(crate) fn draw(density: &dyn Density, stream: Stream, indices: Range<u64>) -> Vec<Option<Draw>> {
+pub fn draw(density: &dyn Density, stream: Stream, indices: Range<u64>) -> Vec<Option<Draw>> {
     indices.into_par_iter().map(|index| density.draw(&stream, index)).collect()
 }
 

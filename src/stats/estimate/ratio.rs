@@ -16,12 +16,12 @@ pub struct Clusters<'a> {
 
 impl Clusters<'_> {
     /// Total number of failed runs.
-    pub fn failed(&self) -> u64 {
+    pub(crate) fn failed(&self) -> u64 {
         self.failures.iter().sum()
     }
 
     /// Number of clusters with a failed run.
-    pub fn failing(&self) -> u64 {
+    pub(crate) fn failing(&self) -> u64 {
         self.failures.iter().filter(|k| **k > 0).count() as u64
     }
 

@@ -101,7 +101,7 @@ impl Warning {
     pub(crate) const MAX_VOID_FRACTION: f64 = 0.001;
 
     /// Whether the estimate must not be used at all.
-    pub fn is_grave(&self) -> bool {
+    pub(crate) fn is_grave(&self) -> bool {
         match self {
             Warning::MeanWeightOff { .. } => true,
             Warning::OneWeightDominates { share } => *share > 0.5,

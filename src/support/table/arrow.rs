@@ -38,7 +38,7 @@ impl ArrowRows {
     }
 
     /// Number of rows since the last batch.
-    pub fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.count
     }
 

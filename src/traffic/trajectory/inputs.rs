@@ -118,7 +118,7 @@ impl Inputs {
     }
 
     /// Number of files of recordings.
-    pub(crate) fn count(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.files.len()
     }
 
@@ -168,7 +168,7 @@ impl InputFile {
     }
 
     /// The files that are read.
-    pub fn paths(&self) -> Vec<PathBuf> {
+    pub(crate) fn paths(&self) -> Vec<PathBuf> {
         match self {
             InputFile::Highd(files) => {
                 [&files.tracks, &files.tracks_meta, &files.recording_meta].map(PathBuf::clone).to_vec()

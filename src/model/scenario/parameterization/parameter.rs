@@ -139,7 +139,7 @@ impl Variable {
 
 impl Parameter {
     /// The quantity that defines its plausible and physical range; `None` if there is none.
-    pub fn quantity(&self) -> Option<Quantity> {
+    pub(crate) fn quantity(&self) -> Option<Quantity> {
         match (&*self.name, &*self.unit) {
             ("lateral_speed_mps", _) => Some(Quantity::LateralSpeed),
             ("acceleration_target_mps2" | "acceleration_lead_mps2", _) => Some(Quantity::Acceleration),

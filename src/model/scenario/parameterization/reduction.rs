@@ -110,7 +110,7 @@ impl Reduction {
     }
 
     /// The scenario reconstructed from its first `d` coefficients.
-    pub fn reduce(&self, scenario: &Scenario, d: usize) -> Result<ReducedScenario> {
+    pub(crate) fn reduce(&self, scenario: &Scenario, d: usize) -> Result<ReducedScenario> {
         Ok(self.rebuild(&self.coefficients(scenario, d)?, scenario.side.sign()))
     }
 
@@ -167,7 +167,7 @@ impl Reduction {
     }
 
     /// The case of a scenario reduced to `d` coefficients, with the scenario's sizes.
-    pub fn case(&self, scenario: &Scenario, d: usize, grid: impl Into<TimeGrid>) -> Result<Case> {
+    pub(crate) fn case(&self, scenario: &Scenario, d: usize, grid: impl Into<TimeGrid>) -> Result<Case> {
         self.reduce(scenario, d)?.case(self.category, &Sizes::of(scenario), grid.into())
     }
 }
