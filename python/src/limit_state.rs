@@ -77,7 +77,8 @@ impl Opened {
     fn log_densities(&self, points: &[Vec<f64>]) -> Result<Vec<f64>> {
         let truncated = truncated(&self.density)?;
         let log_fraction = truncated.validity_fraction().ln();
-        Ok(points.iter().map(|point| truncated.log_density(point) - log_fraction).collect())
+        let points: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
+        Ok(truncated.log_densities(&points).into_iter().map(|log| log - log_fraction).collect())
     }
 
     /// The limit state of valid points; infinite elsewhere.

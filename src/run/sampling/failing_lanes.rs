@@ -104,9 +104,9 @@ impl Sample {
                 };
                 let draw = |index| weighted.draws.draw(&nominal, &weighted.proposal, index);
                 let origin = |_, point: &[f64]| {
-                    let explained = nominal.kernels().responsibilities(point).into_iter().zip(0..);
+                    let explained = nominal.kernels().responsibilities(&[point]).remove(0).into_iter().zip(0..);
                     let (_, kernel) = explained.fold((0.0, 0), |best, of| if of.0 > best.0 { of } else { best });
-                    let weight = weighted.draws.weight(&nominal, &weighted.proposal, point);
+                    let weight = weighted.draws.weights(&nominal, &weighted.proposal, &[point])[0];
                     Origin { kernel: Some(kernel), weight }
                 };
                 let all = 0..weighted.draws.draws;

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::mixture_density::whitened;
 use super::normal::{normal, uniform};
 use lanesweep_random::Stream;
 use lanesweep_support::{Error, Place, Result};
@@ -12,10 +13,7 @@ use lanesweep_support::{Error, Place, Result};
 const BLOCKS_PER_ATTEMPT: u32 = 8;
 
 /// Maximum number of parameters of a mixture: one attempt uses 32 words, the first of which selects the component.
-const MAX_DIMENSIONS: usize = 4 * BLOCKS_PER_ATTEMPT as usize - 1;
-
-/// Sums skip components further than this below the largest, in ln: each is less than 3e-20 of it.
-const NEGLIGIBLE: f64 = 45.0;
+pub(super) const MAX_DIMENSIONS: usize = 4 * BLOCKS_PER_ATTEMPT as usize - 1;
 
 /// Σ_k w_k N(μ_k, L_k L_kᵀ) over vectors of parameters, each in its own unit.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,17 +26,17 @@ pub struct Mixture {
     /// Lower-triangular L with zeros above the diagonal; the diagonal is > 0.
     factors: Vec<DMatrix<f64>>,
     /// One per factor: the rows of L⁻¹ up to its diagonal, one after the other.
-    inverses: Vec<Vec<f64>>,
+    pub(super) inverses: Vec<Vec<f64>>,
     /// Index into `factors`, one per component; kernels share one factor.
-    factor_of: Vec<usize>,
+    pub(super) factor_of: Vec<usize>,
     /// Cumulative weights up to and including each component; the last is 1.
     cumulative: Vec<f64>,
-    /// L⁻¹ μ of all components, parameter by parameter, so that the inner loop runs over thousands of kernels.
-    whitened_means: Vec<f64>,
+    /// L⁻¹ μ of all components, one after the other.
+    pub(super) whitened_means: Vec<f64>,
     /// ln of each component's weighted height, w (2π)^{−d/2} / det L.
-    log_heights: Vec<f64>,
+    pub(super) log_heights: Vec<f64>,
     /// Ranges of consecutive components with the same factor: a point is whitened once for each.
-    runs: Vec<Range<usize>>,
+    pub(super) runs: Vec<Range<usize>>,
 }
 
 /// The rows of L⁻¹ up to the diagonal, of a lower-triangular L with a positive diagonal.
@@ -47,15 +45,6 @@ fn inverse(factor: &DMatrix<f64>) -> Vec<f64> {
     let mut columns = DMatrix::identity(d, d);
     factor.solve_lower_triangular_mut(&mut columns);
     (0..d).flat_map(|i| (0..=i).map(move |j| (i, j))).map(|at| columns[at]).collect()
-}
-
-/// z = L⁻¹ x, with the rows of [`inverse`].
-fn whiten(inverse: &[f64], point: &[f64], z: &mut [f64]) {
-    let mut start = 0;
-    for (i, z) in z.iter_mut().enumerate() {
-        *z = inverse[start..=start + i].iter().zip(point).map(|(l, x)| l * x).sum();
-        start += i + 1;
-    }
 }
 
 impl Mixture {
@@ -118,16 +107,12 @@ impl Mixture {
         let log_constant = -0.5 * dimensions as f64 * libm::log(2.0 * std::f64::consts::PI);
         let log_determinants: Vec<f64> =
             factors.iter().map(|factor| factor.diagonal().iter().map(|spread| libm::log(*spread)).sum()).collect();
-        let mut whitened_means = vec![0.0; n * dimensions];
+        let mut whitened_means = Vec::with_capacity(n * dimensions);
         let mut log_heights = Vec::with_capacity(n);
         let mut runs: Vec<Range<usize>> = Vec::new();
         let inverses: Vec<Vec<f64>> = factors.iter().map(inverse).collect();
-        let mut z = vec![0.0; dimensions];
         for k in 0..n {
-            whiten(&inverses[factor_of[k]], &means[k], &mut z);
-            for (j, z) in z.iter().enumerate() {
-                whitened_means[j * n + k] = *z;
-            }
+            whitened_means.extend(whitened(&inverses[factor_of[k]], &means[k]));
             log_heights.push(libm::log(weights[k]) + log_constant - log_determinants[factor_of[k]]);
             match runs.last_mut() {
                 Some(run) if factor_of[run.start] == factor_of[k] => run.end = k + 1,
@@ -197,9 +182,7 @@ impl Mixture {
 
     /// L⁻¹ x of a point, with the L of a component.
     pub(crate) fn whitened(&self, component: usize, point: &[f64]) -> Vec<f64> {
-        let mut z = vec![0.0; self.dimensions];
-        whiten(&self.inverses[self.factor_of[component]], point, &mut z);
-        z
+        whitened(&self.inverses[self.factor_of[component]], point)
     }
 
     /// Whether all components have one covariance.
@@ -214,60 +197,6 @@ impl Mixture {
     pub(crate) fn scaled(&self, factor: f64) -> Result<Mixture> {
         let factors = self.factors.iter().map(|own| own * factor.sqrt()).collect();
         Mixture::new(self.weights.clone(), self.means.clone(), factors, self.factor_of.clone())
-    }
-
-    /// ln of the density at a point [1 / product of the units]; −∞ where a coordinate is not finite.
-    pub fn log_density(&self, point: &[f64]) -> f64 {
-        let mut parts = Vec::new();
-        let top = self.log_parts(point, &mut parts);
-        if top == f64::NEG_INFINITY {
-            return top;
-        }
-        let near = parts.iter().map(|p| p - top).filter(|p| *p > -NEGLIGIBLE);
-        top + libm::log(near.map(libm::exp).sum::<f64>())
-    }
-
-    /// The fraction of each component in the density at a point, sum 1; all 0 if the density is 0.
-    pub fn responsibilities(&self, point: &[f64]) -> Vec<f64> {
-        let mut parts = Vec::new();
-        let top = self.log_parts(point, &mut parts);
-        if top == f64::NEG_INFINITY {
-            return vec![0.0; parts.len()];
-        }
-        parts.iter_mut().for_each(|part| *part = libm::exp(*part - top));
-        let sum: f64 = parts.iter().sum();
-        parts.iter_mut().for_each(|part| *part /= sum);
-        parts
-    }
-
-    /// Writes ln of each component's weighted density at a point into `parts`; returns the maximum.
-    pub(super) fn log_parts(&self, point: &[f64], parts: &mut Vec<f64>) -> f64 {
-        let (d, n) = (self.dimensions, self.weights.len());
-        parts.clear();
-        parts.resize(n, 0.0);
-        if point.len() != d || point.iter().any(|x| !x.is_finite()) {
-            parts.fill(f64::NEG_INFINITY);
-            return f64::NEG_INFINITY;
-        }
-        let mut z = [0.0; MAX_DIMENSIONS];
-        let z = &mut z[..d];
-        for run in &self.runs {
-            whiten(&self.inverses[self.factor_of[run.start]], point, z);
-            let distances = &mut parts[run.clone()];
-            for (j, z) in z.iter().enumerate() {
-                let means = &self.whitened_means[j * n + run.start..j * n + run.end];
-                for (distance, mean) in distances.iter_mut().zip(means) {
-                    let away = z - mean;
-                    *distance += away * away;
-                }
-            }
-        }
-        let mut top = f64::NEG_INFINITY;
-        for (part, height) in parts.iter_mut().zip(&self.log_heights) {
-            *part = height - 0.5 * *part;
-            top = if *part > top { *part } else { top };
-        }
-        top
     }
 
     /// The point of an index: a pure function of (stream, index, attempt). Attempts are independent draws at one index,

@@ -83,6 +83,10 @@ impl<'a> Weighted<'a> {
         Weighted { points, d, covariance, effective }
     }
 
+    fn places(&self) -> Vec<&'a [f64]> {
+        self.points.iter().map(|(point, _)| *point).collect()
+    }
+
     /// The number of components with the largest held-out likelihood; the smaller one of almost equal candidates.
     fn chosen(&self, components: usize, seed: u64) -> Result<usize> {
         // A component takes its weight, mean and covariance from at least d + 1 points.
@@ -102,7 +106,8 @@ impl<'a> Weighted<'a> {
         let parts: Vec<[Weighted; 2]> = (0..FOLDS).map(|fold| [part(fold, false), part(fold, true)]).collect();
         let held_out = |[fitted, held_out]: &[Weighted; 2], components: usize| -> Result<f64> {
             let mixture = fitted.expectation_maximisation(components, seed)?;
-            Ok(held_out.points.iter().map(|(point, weight)| weight * mixture.log_density(point)).sum::<f64>())
+            let logs = mixture.log_densities(&held_out.places());
+            Ok(held_out.points.iter().zip(logs).map(|((_, weight), log)| weight * log).sum::<f64>())
         };
         let (mut best, mut worse) = ((f64::NEG_INFINITY, 1), 0);
         for components in candidates {
@@ -178,17 +183,14 @@ impl<'a> Weighted<'a> {
         }
         let mut mixture = self.maximise(&responsibilities)?;
         let mut last = f64::NEG_INFINITY;
-        let mut parts = Vec::new();
+        let places = self.places();
         for _ in 0..ITERATIONS {
             responsibilities = vec![vec![0.0; n]; mixture.weights().len()];
             let mut log_likelihood = 0.0;
-            for (i, (point, weight)) in self.points.iter().enumerate() {
-                let top = mixture.log_parts(point, &mut parts);
-                let sum: f64 = parts.iter().map(|p| libm::exp(p - top)).sum();
-                log_likelihood += weight * (top + libm::log(sum));
-                for (responsibility, part) in responsibilities.iter_mut().zip(&parts) {
-                    responsibility[i] = libm::exp(part - top) / sum;
-                }
+            let explained = mixture.responsibilities_and_log_densities(&places);
+            for (i, ((_, weight), (parts, log_density))) in self.points.iter().zip(explained).enumerate() {
+                log_likelihood += weight * log_density;
+                responsibilities.iter_mut().zip(parts).for_each(|(responsibility, part)| responsibility[i] = part);
             }
             if log_likelihood - last < TOLERANCE {
                 break;

@@ -9,6 +9,7 @@ mod bandwidth;
 mod json_rows;
 mod kde;
 mod mixture;
+mod mixture_density;
 mod mixture_fit;
 mod model;
 mod model_file;

@@ -4,7 +4,7 @@
 //! deviation (Silverman 1986). σ with ddof 0; quantiles interpolate linearly between order statistics, the
 //! first at probability 0 and the last at 1 (R's type 7, NumPy's default).
 
-use nalgebra::{Cholesky, DMatrix, DVector, DVectorView};
+use nalgebra::{Cholesky, DMatrix, DVector};
 
 /// Mean and covariance (d × d) of weighted points; the weights need not sum to 1. The covariance is divided by the sum
 /// of the weights (population covariance).
@@ -15,16 +15,20 @@ pub(crate) fn moments<'a>(
     let total: f64 = points.clone().map(|(_, weight)| weight).sum();
     let mut mean = DVector::zeros(d);
     for (point, weight) in points.clone() {
-        mean.axpy(weight, &DVectorView::from_slice(point, d), 1.0);
+        mean.iter_mut().zip(point).for_each(|(mean, x)| *mean += weight * x);
     }
     mean /= total;
-    let mut covariance = DMatrix::zeros(d, d);
+    // Column by column, down to the diagonal.
+    let mut upper = vec![0.0; d * d];
+    let mut from_mean = vec![0.0; d];
     for (point, weight) in points {
-        let from_mean = DVectorView::from_slice(point, d) - &mean;
-        covariance.ger(weight, &from_mean, &from_mean, 1.0);
+        from_mean.iter_mut().zip(point).zip(mean.iter()).for_each(|((from_mean, x), mean)| *from_mean = x - mean);
+        for (j, column) in upper.chunks_exact_mut(d.max(1)).enumerate() {
+            let weighted = weight * from_mean[j];
+            column[..=j].iter_mut().zip(&from_mean).for_each(|(sum, from_mean)| *sum += weighted * from_mean);
+        }
     }
-    covariance /= total;
-    // Makes the covariance exactly symmetric, because rounding depends on the order of a product's factors.
+    let mut covariance = DMatrix::from_vec(d, d, upper) / total;
     covariance.fill_lower_triangle_with_upper_triangle();
     (mean, covariance)
 }

@@ -4,7 +4,7 @@
 
 use rayon::prelude::*;
 
-use super::limit_state::{BATCH, Density, LimitState, evaluate_checked};
+use super::limit_state::{AT_ONCE, BATCH, Density, LimitState, evaluate_checked};
 use crate::density::Mixture;
 use lanesweep_random::Stream;
 use lanesweep_support::Result;
@@ -36,6 +36,17 @@ pub(super) struct Pool<'a> {
     crude_draws: f64,
     /// Number of evaluated points.
     pub evaluated: u64,
+}
+
+/// ln of a density at points.
+fn at_points(of: &dyn Density, points: &[&[f64]]) -> Vec<f64> {
+    points.par_chunks(AT_ONCE).flat_map_iter(|points| of.log_densities(points)).collect()
+}
+
+/// Adds draws of a source to the sums of points, given ln of its density there.
+fn add_logs(sums: &mut [f64], draws: f64, logs: &[f64]) {
+    let more = libm::log(draws);
+    sums.iter_mut().zip(logs).for_each(|(sum, log)| *sum = log_add(*sum, more + log));
 }
 
 /// ln(eᵃ + eᵇ).
@@ -109,8 +120,7 @@ impl<'a> Pool<'a> {
 
     /// Draws from the density and keeps every point.
     pub(crate) fn add_nominal(&mut self, stream: Stream, draws: u64) -> Result<()> {
-        let more = libm::log(draws as f64);
-        self.log_sources.iter_mut().zip(&self.log_f).for_each(|(sum, log_f)| *sum = log_add(*sum, more + log_f));
+        add_logs(&mut self.log_sources, draws as f64, &self.log_f);
         self.nominal_draws += draws as f64;
         let points = self.attempts(self.nominal, stream, 0..draws);
         self.add(points, false)
@@ -148,9 +158,8 @@ impl<'a> Pool<'a> {
 
     /// Adds a source to the weights of all points.
     fn register(&mut self, mixture: Mixture, draws: f64) {
-        let more = libm::log(draws);
-        let sums = self.points.par_iter().zip(&self.log_sources);
-        self.log_sources = sums.map(|(point, sum)| log_add(*sum, more + mixture.log_density(point))).collect();
+        let logs = at_points(&mixture, &self.points.iter().map(Vec::as_slice).collect::<Vec<_>>());
+        add_logs(&mut self.log_sources, draws, &logs);
         self.sources.push(Source { mixture, draws });
     }
 
@@ -162,27 +171,27 @@ impl<'a> Pool<'a> {
 
     fn add(&mut self, points: Vec<Vec<f64>>, is_crude: bool) -> Result<()> {
         self.evaluated += if is_crude { 0 } else { points.len() as u64 };
-        let per_point = self.limit_state.questions() * self.limit_state.guides();
         for batch in points.chunks(BATCH as usize) {
             let values = evaluate_checked(self.limit_state, batch)?;
-            let of = |at: usize| &values[at * per_point..(at + 1) * per_point];
-            let logs: Vec<[f64; 2]> = batch.par_iter().map(|point| self.logs(point)).collect();
-            for (at, [log_f, log_sources]) in logs.into_iter().enumerate() {
-                self.points.push(batch[at].clone());
-                self.values.extend_from_slice(of(at));
-                self.log_f.push(log_f);
-                self.log_sources.push(log_sources);
-                self.is_crude.push(is_crude);
+            let points: Vec<&[f64]> = batch.iter().map(Vec::as_slice).collect();
+            let log_f = at_points(self.nominal, &points);
+            let mut log_sources = vec![f64::NEG_INFINITY; points.len()];
+            add_logs(&mut log_sources, self.nominal_draws, &log_f);
+            for source in &self.sources {
+                add_logs(&mut log_sources, source.draws, &at_points(&source.mixture, &points));
             }
+            self.points.extend_from_slice(batch);
+            self.values.extend(values);
+            self.log_f.extend(log_f);
+            self.log_sources.extend(log_sources);
+            self.is_crude.resize(self.points.len(), is_crude);
         }
         Ok(())
     }
 
-    /// ln f and ln Σ n_s g_s of a new point.
-    fn logs(&self, point: &[f64]) -> [f64; 2] {
-        let log_f = self.nominal.log_density(point);
-        let nominal = libm::log(self.nominal_draws) + log_f;
-        let of = |source: &Source| libm::log(source.draws) + source.mixture.log_density(point);
-        [log_f, self.sources.iter().fold(nominal, |sum, source| log_add(sum, of(source)))]
+    /// ln g/f of points.
+    pub(crate) fn log_ratios(&self, proposal: &Mixture, points: impl Iterator<Item = usize> + Clone) -> Vec<f64> {
+        let places: Vec<&[f64]> = points.clone().map(|point| self.points[point].as_slice()).collect();
+        at_points(proposal, &places).into_iter().zip(points).map(|(log, point)| log - self.log_f[point]).collect()
     }
 }

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::blocks::BlockSums;
-use super::limit_state::{ATTEMPTS, Density, Failure, LimitState, batches, failing, purpose};
+use super::limit_state::{AT_ONCE, ATTEMPTS, Density, Failure, LimitState, batches, failing, purpose};
 use super::stop::StopReason;
 use super::summary::Estimate;
 use super::warnings::Warning;
@@ -40,13 +40,14 @@ impl Importance {
         Importance { draws, crude_per_draw: crude.div_ceil(draws.max(1)).max(least), ..self }
     }
 
-    /// The weight 1/(m + g/f) of a failing draw of the density f or of the proposal g, with m draws of f for each of g.
-    pub fn weight(&self, nominal: &dyn Density, proposal: &Mixture, point: &[f64]) -> f64 {
+    /// The weights 1/(m + g/f) of failing draws of the density f or of the proposal g, with m draws of f for each of g.
+    pub fn weights(&self, nominal: &dyn Density, proposal: &Mixture, points: &[&[f64]]) -> Vec<f64> {
         let validity = nominal.validity_fraction();
         // An index of the density whose attempts are all invalid is a draw that does not fail.
         let is_drawn = 1.0 - (1.0 - validity).powi(ATTEMPTS as i32);
-        let ratio = libm::exp(proposal.log_density(point) - nominal.log_density(point)) * validity;
-        1.0 / (self.crude_per_draw as f64 * is_drawn + ratio)
+        let logs = proposal.log_densities(points).into_iter().zip(nominal.log_densities(points));
+        let weight = |(g, f): (f64, f64)| 1.0 / (self.crude_per_draw as f64 * is_drawn + libm::exp(g - f) * validity);
+        logs.map(weight).collect()
     }
 
     /// The draw of the proposal of this index; `None` for an invalid one.
@@ -76,10 +77,6 @@ pub(super) fn weighted_failures(
 ) -> Result<Vec<WeightedFailure>> {
     let [of_proposal, of_density] = purposes.map(|purpose| Stream { seed: options.seed, purpose });
     let crude = options.crude_per_draw;
-    let weighted = |(is_crude, of): (bool, Failure)| {
-        let weight = options.weight(nominal, proposal, &of.point);
-        WeightedFailure { of, is_crude, weight }
-    };
     let attempt = |index| Some((index, proposal.draw(&of_proposal, index, 0))).filter(|at| nominal.is_valid(&at.1));
     let attempts: Vec<Option<(u64, Vec<f64>)>> = range.clone().into_par_iter().map(attempt).collect();
     let (indices, points) = attempts.into_iter().flatten().unzip();
@@ -89,7 +86,13 @@ pub(super) fn weighted_failures(
         let found = limit_state.failures(nominal, of_density, range.start * crude..range.end * crude)?;
         failures.extend(found.into_iter().map(|of| (true, Failure { index: of.index / crude, ..of })));
     }
-    Ok(failures.into_par_iter().map(weighted).collect())
+    let of_chunk = |chunk: &[(bool, Failure)]| {
+        let points: Vec<&[f64]> = chunk.iter().map(|(_, of)| of.point.as_slice()).collect();
+        options.weights(nominal, proposal, &points)
+    };
+    let weights: Vec<f64> = failures.par_chunks(AT_ONCE).flat_map_iter(of_chunk).collect();
+    let weighted = |((is_crude, of), weight)| WeightedFailure { of, is_crude, weight };
+    Ok(failures.into_iter().zip(weights).map(weighted).collect())
 }
 
 /// Draws, evaluates and weights a range of draws of the proposal, and the draws of the density that belong to them. Returns

@@ -4,7 +4,8 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::importance::{Importance, weighted_failures};
+use super::importance::{Importance, WeightedFailure, weighted_failures};
+use super::limit_state::AT_ONCE;
 use super::limit_state::{Density, LimitState, purpose};
 use super::ratio::of_clusters;
 use super::summary::Estimate;
@@ -15,7 +16,7 @@ use lanesweep_support::Result;
 /// Number of draws of the proposal for counting the fractions.
 const DRAWS: u64 = 4096;
 /// Number of points whose kernels are held at once.
-const AT_ONCE: usize = 256;
+const KEPT: usize = 256;
 
 /// A kernel, that is a scenario, with the fraction of the failures that come from it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -70,9 +71,12 @@ pub fn kernel_shares(
     let purposes = [purpose::SHARES, purpose::BESIDE_SHARES];
     let failing = weighted_failures(nominal, proposal, limit_state, &options, purposes, 0..DRAWS)?;
     let mut counts = vec![Counts::new(kernels.weights().len()); limit_state.questions()];
-    for chunk in failing.chunks(AT_ONCE) {
-        let explained: Vec<Vec<f64>> =
-            chunk.par_iter().map(|failing| kernels.responsibilities(&failing.of.point)).collect();
+    for chunk in failing.chunks(KEPT) {
+        let of_part = |part: &[WeightedFailure]| {
+            let points: Vec<&[f64]> = part.iter().map(|failing| failing.of.point.as_slice()).collect();
+            kernels.responsibilities(&points)
+        };
+        let explained: Vec<Vec<f64>> = chunk.par_chunks(AT_ONCE).flat_map_iter(of_part).collect();
         // In the order of the indices, so that the bits do not depend on the number of threads.
         for (failing, shares) in chunk.iter().zip(&explained) {
             let asked = counts.iter_mut().zip(&failing.of.fails).filter(|(_, fails)| **fails);

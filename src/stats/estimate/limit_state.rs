@@ -45,8 +45,8 @@ pub trait Density: Sync {
     /// Number of parameters.
     fn dimensions(&self) -> usize;
 
-    /// ln of f, **not** divided by P_valid [1 / product of the units]; −∞ at invalid points.
-    fn log_density(&self, point: &[f64]) -> f64;
+    /// ln of f at each point, **not** divided by P_valid [1 / product of the units]; −∞ at invalid points.
+    fn log_densities(&self, points: &[&[f64]]) -> Vec<f64>;
 
     /// One attempt at the point of an index: a draw of f before truncation. A pure function of its arguments.
     fn attempt(&self, stream: &Stream, index: u64, attempt: u32) -> Vec<f64>;
@@ -80,8 +80,8 @@ impl Density for Mixture {
         Mixture::dimensions(self)
     }
 
-    fn log_density(&self, point: &[f64]) -> f64 {
-        Mixture::log_density(self, point)
+    fn log_densities(&self, points: &[&[f64]]) -> Vec<f64> {
+        Mixture::log_densities(self, points)
     }
 
     fn attempt(&self, stream: &Stream, index: u64, attempt: u32) -> Vec<f64> {
@@ -127,8 +127,9 @@ impl<V: Fn(&[f64]) -> bool + Sync> Density for Truncated<V> {
         self.mixture.dimensions()
     }
 
-    fn log_density(&self, point: &[f64]) -> f64 {
-        if (self.is_valid)(point) { self.mixture.log_density(point) } else { f64::NEG_INFINITY }
+    fn log_densities(&self, points: &[&[f64]]) -> Vec<f64> {
+        let logs = points.iter().zip(self.mixture.log_densities(points));
+        logs.map(|(point, log)| if (self.is_valid)(point) { log } else { f64::NEG_INFINITY }).collect()
     }
 
     fn attempt(&self, stream: &Stream, index: u64, attempt: u32) -> Vec<f64> {
@@ -231,6 +232,9 @@ pub(super) fn failing<L: LimitState + ?Sized>(
     Ok(failures.filter(|failure| failure.fails.contains(&true)).collect())
 }
 
+/// Points whose densities one task of a thread computes.
+pub(super) const AT_ONCE: usize = 64;
+
 /// Maximum number of points drawn and evaluated at a time: bounds the memory of any sample.
 pub(crate) const BATCH: u64 = 1 << 16;
 
@@ -263,7 +267,7 @@ mod tests {
         assert!(draws.iter().all(|d| d.point[0] > 0.0));
         let tries: u32 = draws.iter().map(|d| d.tries).sum();
         assert!((f64::from(tries) / 10_000.0 - 2.0).abs() < 0.1);
-        assert_eq!(half.log_density(&[-1.0, 0.0]), f64::NEG_INFINITY);
+        assert_eq!(half.log_densities(&[&[-1.0, 0.0]]), [f64::NEG_INFINITY]);
     }
 
     #[test]

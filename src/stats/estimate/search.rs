@@ -8,7 +8,6 @@
 //! draws of the density show none where it is thin.
 
 use nalgebra::DMatrix;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::evaluated_points::{Pool, effective_size};
@@ -400,11 +399,8 @@ impl<'a> Searching<'a> {
         self.pool.add_nominal(self.stream(1), of_density)?;
         let new = from..self.pool.points.len();
         let validity = self.nominal.validity_fraction();
-        let weight = |point: usize| {
-            let ratio = libm::exp(candidate.log_density(&self.pool.points[point]) - self.pool.log_f[point]);
-            1.0 / ((OF_DENSITY + (1.0 - OF_DENSITY) * ratio) * validity)
-        };
-        let weights: Vec<f64> = new.clone().into_par_iter().map(weight).collect();
+        let weight = |log_ratio| 1.0 / ((OF_DENSITY + (1.0 - OF_DENSITY) * libm::exp(log_ratio)) * validity);
+        let weights: Vec<f64> = self.pool.log_ratios(&candidate, new.clone()).into_iter().map(weight).collect();
         let mut goes_on = false;
         for &at in &settled {
             let failing = new.clone().zip(&weights).filter(|(point, _)| self.pool.fails(*point, at));
@@ -441,8 +437,7 @@ impl<'a> Searching<'a> {
             self.add_crude(wanted - self.crude)?;
         }
         let crude: Vec<usize> = self.pool.crude_failures().collect();
-        let log_ratio = |point: &usize| proposal.log_density(&self.pool.points[*point]) - self.pool.log_f[*point];
-        let log_ratios: Vec<f64> = crude.par_iter().map(log_ratio).collect();
+        let log_ratios = self.pool.log_ratios(proposal, crude.iter().copied());
         let mut goes_on = false;
         for &at in settled {
             let probability = self.found[at].probability;
