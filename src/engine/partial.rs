@@ -1,7 +1,6 @@
 //! Results of lanes as exact integer counts per unit. A chunk, a journal record and a shard's part are partials.
 //! Merging is associative and commutative.
 
-use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
@@ -127,18 +126,6 @@ impl Partial {
         let first: usize = plan.blocks[..block].iter().map(|before| plan.headway_cells(before)).sum();
         let cells = self.headway_failures.get(first..first + plan.headway_cells(&plan.blocks[block]));
         cells.ok_or_else(|| Error::Internal("a partial does not have the headways of its plan".to_owned()))
-    }
-
-    /// The covered units as disjoint intervals, ascending.
-    pub(crate) fn covered(&self) -> Vec<Range<u64>> {
-        let mut intervals: Vec<Range<u64>> = Vec::new();
-        for unit in self.units.iter().map(|u| u.unit) {
-            match intervals.last_mut() {
-                Some(last) if last.end == unit => last.end = unit + 1,
-                _ => intervals.push(unit..unit + 1),
-            }
-        }
-        intervals
     }
 
     /// Whether every unit has as many counts as the plan's variants, models and criteria require.

@@ -476,7 +476,7 @@ impl Units {
     }
 
     /// Whether there are no units.
-    pub(crate) fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 

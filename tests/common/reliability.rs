@@ -65,9 +65,9 @@ impl Density for StandardNormal {
         self.dimensions
     }
 
-    fn log_density(&self, point: &[f64]) -> f64 {
-        let square: f64 = point.iter().map(|x| x * x).sum();
-        -0.5 * (square + self.dimensions as f64 * libm::log(2.0 * std::f64::consts::PI))
+    fn log_densities(&self, points: &[&[f64]]) -> Vec<f64> {
+        let constant = self.dimensions as f64 * libm::log(2.0 * std::f64::consts::PI);
+        points.iter().map(|point| -0.5 * (point.iter().map(|x| x * x).sum::<f64>() + constant)).collect()
     }
 
     fn attempt(&self, stream: &Stream, index: u64, attempt: u32) -> Vec<f64> {

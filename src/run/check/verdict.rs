@@ -19,9 +19,6 @@ pub enum Answer {
 }
 
 impl Answer {
-    /// All, in the order of tables.
-    pub(crate) const ALL: [Answer; 4] = [Answer::Preventable, Answer::NotPreventable, Answer::NoConflict, Answer::Open];
-
     /// The words of sheets and maps.
     pub fn label(self) -> &'static str {
         match self {

@@ -63,7 +63,7 @@ impl GridAxis {
     }
 
     /// Whether there are no values; false for every parsed axis.
-    pub(crate) fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         self.values.is_empty()
     }
 

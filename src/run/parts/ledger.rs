@@ -255,7 +255,14 @@ fn add(sum: &mut [u64; 2], more: [u64; 2]) {
 
 impl MergeableCounts for Partial {
     fn covered(&self) -> Vec<Range<u64>> {
-        Partial::covered(self)
+        let mut intervals: Vec<Range<u64>> = Vec::new();
+        for unit in self.units().iter().map(|of| of.unit) {
+            match intervals.last_mut() {
+                Some(last) if last.end == unit => last.end = unit + 1,
+                _ => intervals.push(unit..unit + 1),
+            }
+        }
+        intervals
     }
 
     fn join(self, other: Self) -> Result<Self> {

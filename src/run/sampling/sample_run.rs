@@ -82,7 +82,7 @@ impl Sample {
     ///
     /// # Errors
     /// As [`Job::run_shard`]; [`Error::Internal`] before the search of importance sampling.
-    pub(crate) fn run_shard(&self, out: &Path, shard: Shard, executor: &Executor) -> Result<()> {
+    pub fn run_shard(&self, out: &Path, shard: Shard, executor: &Executor) -> Result<()> {
         with_job!(self, job => job.run_shard(out, shard, executor))
     }
 
@@ -99,7 +99,7 @@ impl Sample {
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Input`] with the missing, duplicate, foreign or damaged parts.
-    pub(crate) fn merge_parts(out: &Path, again: &dyn Fn(Shard) -> String) -> Result<(Sample, SampleResult)> {
+    pub fn merge_parts(out: &Path, again: &dyn Fn(Shard) -> String) -> Result<(Sample, SampleResult)> {
         let sample = Sample::read(&out.join(PLAN_FILE))?;
         let result = with_job!(sample, job => job.merge(out, again))?;
         Ok((sample, result))

@@ -112,9 +112,8 @@ impl pulp::NullaryFnOnce for Evaluate<'_> {
 }
 
 impl Mixture {
-    /// ln of the density at a point.
-    #[cfg(test)]
-    pub(super) fn log_density(&self, point: &[f64]) -> f64 {
+    /// ln of the density at a point, as [`Mixture::log_densities`].
+    pub fn log_density(&self, point: &[f64]) -> f64 {
         self.log_densities(&[point])[0]
     }
 
