@@ -1,13 +1,11 @@
-//! The parts of a study one by one, with criterion's statistics: reading, mining, the decomposition, planning,
-//! sweeping, scoring; and the study end to end.
+//! The parts of a study one by one: reading, mining, the decomposition, planning, sweeping, scoring; and the study end to end.
 //!
-//! `cargo bench --bench parts [-- FILTER]`. Synthetic data.
+//! `cargo bench --bench parts [-- FILTER]` prints a CSV row per part: the median and the least of its repetitions. Synthetic data.
 
 mod common;
 
 use std::hint::black_box;
-
-use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
+use std::time::Instant;
 
 use common::{paper_size_scenarios, swept};
 use lanesweep::engine::CpuBackend;
@@ -21,90 +19,85 @@ use lanesweep::traffic::mining::{MiningOptions, mine, mine_folder, mine_generate
 use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
 use lanesweep::traffic::trajectory::highd::{self, HighdFiles};
 
+const REPETITIONS: usize = 20;
+
+/// Times a part whose name holds the filter, and prints its row.
+fn time<T>(part: &str, amount: u64, unit: &str, work: impl Fn() -> T) {
+    let filter = std::env::args().skip(1).find(|arg| !arg.starts_with('-')).unwrap_or_default();
+    if !part.contains(&filter) {
+        return;
+    }
+    let once = |_| {
+        let start = Instant::now();
+        black_box(work());
+        start.elapsed().as_secs_f64()
+    };
+    once(0);
+    let mut seconds: Vec<f64> = (0..REPETITIONS).map(once).collect();
+    seconds.sort_by(f64::total_cmp);
+    println!("{part},{},{},{amount},{unit}", seconds[REPETITIONS / 2], seconds[0]);
+}
+
 /// Reading one recording, mining it, and both for a folder of four.
-fn recordings(criterion: &mut Criterion) {
+fn recordings() {
     let folder = tempfile::tempdir().unwrap();
     let options = GeneratorOptions { recordings: 4, ..GeneratorOptions::default() };
     for index in 0..options.recordings {
-        let recording = generate_one(&options, index).unwrap();
-        highd::write(folder.path(), &recording).unwrap();
+        highd::write(folder.path(), &generate_one(&options, index).unwrap()).unwrap();
     }
     let files = HighdFiles::named(folder.path(), "01");
     let bytes = std::fs::metadata(&files.tracks).unwrap().len();
     let all: u64 = std::fs::read_dir(folder.path()).unwrap().map(|f| f.unwrap().metadata().unwrap().len()).sum();
     let recording = highd::read(&files).unwrap().recording;
     let mining = MiningOptions::default();
-    let mut group = criterion.benchmark_group("recordings");
-    group.throughput(Throughput::Bytes(bytes)).sample_size(20);
-    group.bench_function("read one", |b| b.iter(|| highd::read(black_box(&files)).unwrap()));
-    group.bench_function("mine one", |b| b.iter(|| mine(black_box(&recording), &mining)));
-    group.throughput(Throughput::Bytes(all));
-    group.bench_function("read and mine a folder", |b| {
-        b.iter(|| mine_folder(folder.path(), &mining, Default::default(), || Ok(())).unwrap())
-    });
-    group.finish();
+    time("read one", bytes, "bytes", || highd::read(black_box(&files)).unwrap());
+    time("mine one", bytes, "bytes", || mine(black_box(&recording), &mining));
+    let folder = || mine_folder(folder.path(), &mining, Default::default(), || Ok(())).unwrap();
+    time("read and mine a folder", all, "bytes", folder);
 }
 
-/// The decomposition and the plan of a study of the paper's size.
-fn planning(criterion: &mut Criterion) {
+/// The decomposition, the plan, lanes of each category and model, and the scores of a study of the paper's size.
+fn paper_size() {
     let scenarios = paper_size_scenarios();
     let profile = Profile::load("paper").unwrap();
-    let mut group = criterion.benchmark_group("planning");
-    group.sample_size(20);
+    let cpu = CpuBackend::lane_arithmetic();
     for category in Category::ALL {
         let of: Vec<&Scenario> = scenarios.iter().filter(|s| s.category == category).collect();
         let options = ParameterizationOptions::default();
-        group.bench_function(format!("svd {} ({} scenarios)", category.key(), of.len()), |b| {
-            b.iter(|| Reduction::fit(category, black_box(&of), &options).unwrap());
-        });
-    }
-    let options = StudyOptions::default();
-    group.bench_function("plan", |b| b.iter(|| plan_study(black_box(&scenarios), &profile, &options).unwrap()));
-    group.finish();
-}
-
-/// Lanes of each category and model, and the scores of a study.
-fn sweeping(criterion: &mut Criterion) {
-    let scenarios = paper_size_scenarios();
-    let profile = Profile::load("paper").unwrap();
-    let cpu = CpuBackend::lane_arithmetic();
-    let mut group = criterion.benchmark_group("sweep");
-    group.sample_size(10);
-    for category in Category::ALL {
+        let fit = || Reduction::fit(category, black_box(&of), &options).unwrap();
+        time(&format!("svd {}", category.key()), of.len() as u64, "scenarios", fit);
         for model in ModelId::ALL {
             let options = StudyOptions { categories: vec![category], models: vec![model], ..Default::default() };
             let plan = plan_study(&scenarios, &profile, &options).unwrap();
-            group.throughput(Throughput::Elements(common::lane_steps(&plan, &cpu)));
-            let name = format!("{} {}", category.key(), model.name());
-            group.bench_function(name, |b| b.iter(|| swept(black_box(&plan), &cpu)));
+            let name = format!("sweep {} {}", category.key(), model.name());
+            time(&name, common::lane_steps(&plan, &cpu), "lane-steps", || swept(black_box(&plan), &cpu));
         }
     }
-    group.finish();
-    let plan = plan_study(&scenarios, &profile, &StudyOptions::default()).unwrap();
-    let partial = swept(&plan, &cpu);
-    criterion.bench_function("score", |b| b.iter(|| score(&plan, &partial, &ScoreOptions::default()).unwrap()));
+    let plan = || plan_study(black_box(&scenarios), &profile, &StudyOptions::default()).unwrap();
+    let made = plan();
+    time("plan", made.lane_count(), "lanes", plan);
+    let partial = swept(&made, &cpu);
+    time("score", made.lane_count(), "lanes", || score(&made, &partial, &ScoreOptions::default()).unwrap());
 }
 
 /// The default study: generated recordings to scores.
-fn study(criterion: &mut Criterion) {
+fn study() {
     let profile = Profile::load("paper").unwrap();
     let cpu = CpuBackend::lane_arithmetic();
-    let mut group = criterion.benchmark_group("study");
-    group.sample_size(10);
-    group.bench_function("default, end to end", |b| {
-        b.iter_batched(
-            GeneratorOptions::default,
-            |generator| {
-                let mined = mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap();
-                let plan = plan_study(&mined.scenarios, &profile, &StudyOptions::default()).unwrap();
-                let partial = swept(&plan, &cpu);
-                score(&plan, &partial, &ScoreOptions::default()).unwrap()
-            },
-            BatchSize::PerIteration,
-        );
+    time("study, end to end", 1, "studies", || {
+        let mined = mine_generated(&GeneratorOptions::default(), &MiningOptions::default(), || Ok(())).unwrap();
+        let plan = plan_study(&mined.scenarios, &profile, &StudyOptions::default()).unwrap();
+        score(&plan, &swept(&plan, &cpu), &ScoreOptions::default()).unwrap()
     });
-    group.finish();
 }
 
-criterion_group!(parts, recordings, planning, sweeping, study);
-criterion_main!(parts);
+fn main() {
+    // `cargo test --benches` calls without `--bench`: nothing to time then.
+    if !std::env::args().any(|arg| arg == "--bench") {
+        return;
+    }
+    println!("part,median_s,least_s,amount,unit");
+    recordings();
+    paper_size();
+    study();
+}

@@ -2,6 +2,7 @@
 
 mod common;
 mod lanes;
+mod memory;
 mod scenarios;
 mod statistics;
 mod traffic;

@@ -1,7 +1,5 @@
 //! Where device tests find a device: a software Vulkan, which any machine can have.
 
-#![allow(dead_code)] // every test binary uses its own part
-
 use std::io::Write;
 
 use lanesweep::engine::Backend;

@@ -1,7 +1,5 @@
 //! Recordings as exiD files on a bent road, and as plain tables of tracks.
 
-#![allow(dead_code)] // every test binary uses its own part
-
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;

@@ -1,9 +1,7 @@
 //! Lanes to compare backends with: profiles in which every option takes every form, and plans.
-#![allow(dead_code)] // every test binary uses its own part
-
 use super::mined::scenarios_of;
 use lanesweep::engine::verify::{SetOptions, random_plan, threshold_plan};
-use lanesweep::engine::{Constants, LaneCase, LanePlan, Observer, Outcome, Start};
+use lanesweep::engine::{Constants, LaneCase, LanePlan, Outcome, Start, Step};
 use lanesweep::model::criterion::{BtnContact, BtnForm, LateralGate};
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::{CutOutEvaluated, CutOutTarget, Profile};
@@ -69,17 +67,34 @@ pub fn run_case<R: Real>(
     case: &Case,
     model: ModelId,
     start: Start<R>,
-    observer: &mut impl Observer<R>,
+    observer: &mut dyn FnMut(&Step<R>),
 ) -> Outcome<f64> {
     let mut tables = Tables::default();
     let lane = LaneCase::encode(case, profile, &mut tables);
     let constants = Constants::<R>::resolve(profile, case.category);
-    constants.run(model, &lane.cast(), &tables.cast(), start, observer).widen()
+    run_lane(&constants, model, (&lane.cast(), &tables.cast()), start, observer).widen()
+}
+
+/// A lane whose case is encoded. All tests have one type of observers: for each, all drivers are compiled.
+pub fn run_lane<R: Real>(
+    constants: &Constants<R>,
+    model: ModelId,
+    (case, tables): (&LaneCase<R>, &Tables<R>),
+    start: Start<R>,
+    mut observer: &mut dyn FnMut(&Step<R>),
+) -> Outcome<R> {
+    constants.run(model, case, tables, start, &mut observer)
 }
 
 /// Random lanes of each model and category.
 pub fn random(profile: &Profile, lanes: u64) -> LanePlan {
     random_plan(profile, &SetOptions { size: lanes, ..Default::default() }).unwrap()
+}
+
+/// The same of one model, and its lanes on thresholds.
+pub fn of_model(profile: &Profile, model: ModelId, lanes: u64) -> [LanePlan; 2] {
+    let options = |size| SetOptions { size, models: vec![model], ..Default::default() };
+    [random_plan(profile, &options(lanes)).unwrap(), threshold_plan(profile, &options(8)).unwrap()]
 }
 
 /// Lanes on thresholds: so many units of each threshold and category.

@@ -1,13 +1,14 @@
 //! Scenarios of the generator, and densities over them.
 
 use std::collections::BTreeMap;
-use std::sync::Mutex;
+use std::sync::{Arc, LazyLock, Mutex, OnceLock};
 
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, DataProvenance, Scenario};
 use lanesweep::stats::density::{DensityModel, FitOptions};
 use lanesweep::traffic::mining::{Collection, MiningOptions, mine_generated};
-use lanesweep::traffic::trajectory::generator::GeneratorOptions;
+use lanesweep::traffic::trajectory::Recording;
+use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate};
 
 /// What is mined from the first recordings of the generator.
 pub fn mined(recordings: usize) -> Collection {
@@ -34,6 +35,21 @@ pub fn kept(scenarios: &[Scenario], category: Category) -> Vec<&Scenario> {
 /// Where they come from.
 pub fn provenance() -> DataProvenance {
     DataProvenance { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None }
+}
+
+/// The first of the default recordings, made once: each is the same whatever their number.
+pub fn recordings(count: usize) -> &'static [Recording] {
+    static MADE: LazyLock<Vec<Recording>> =
+        LazyLock::new(|| generate(&GeneratorOptions { recordings: 28, ..GeneratorOptions::default() }).unwrap());
+    &MADE[..count]
+}
+
+/// The density of a parameterization over the scenarios of the first recordings, fitted once.
+pub fn density_of(recordings: usize, category: Category, key: &str, with_thw: bool) -> DensityModel {
+    type Fitted = BTreeMap<(usize, Category, String, bool), Arc<OnceLock<DensityModel>>>;
+    static FITTED: Mutex<Fitted> = Mutex::new(BTreeMap::new());
+    let cell = FITTED.lock().unwrap().entry((recordings, category, key.to_owned(), with_thw)).or_default().clone();
+    cell.get_or_init(|| fitted(scenarios_of(recordings), category, key, with_thw)).clone()
 }
 
 /// A density over scenarios, with few draws for what is valid.

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 
 pub mod counting;
 pub mod device;
+pub mod dice;
 pub mod exid;
 pub mod lane_sets;
 pub mod mined;

@@ -1,6 +1,4 @@
 //! Plans and chunks without physics: every verdict is chosen by the test.
-#![allow(dead_code)]
-
 use std::sync::Arc;
 
 use lanesweep::engine::{Block, CaseSource, Chunk, Headway, LaneCase, LanePlan, LaneRunner, Outcome, Verdicts};

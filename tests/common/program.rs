@@ -117,6 +117,15 @@ pub fn files(dir: &Path) -> Files {
     names(dir).into_iter().map(|name| (name.clone(), std::fs::read(dir.join(name)).unwrap())).collect()
 }
 
+/// Copies a folder into another.
+pub fn copy(from: &Path, to: &Path) {
+    for (name, content) in files(from) {
+        let to = to.join(name);
+        std::fs::create_dir_all(to.parent().unwrap()).unwrap();
+        std::fs::write(to, content).unwrap();
+    }
+}
+
 const RECORDS: [&str; 3] = ["run.json", "estimate.json", "map.json"];
 
 /// The same with records and pages changed.

@@ -1,7 +1,5 @@
 //! A small valid recording, and its three files as texts that a test can spoil.
 
-#![allow(dead_code)] // every test binary uses its own part
-
 use std::fs;
 use std::path::Path;
 

@@ -2,18 +2,15 @@
 //! chunks; and a wrong count is found.
 
 use crate::common::device::{open, patched};
-use crate::common::mined::{fitted, scenarios};
+use crate::common::mined::density_of;
 use lanesweep::engine::gpu::GpuOptions;
 use lanesweep::engine::{Backend, CpuBackend, Executor, Headway, SampleTally};
+use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{Estimator, Sample, SampleHeadways, SampleOptions};
 use lanesweep::scenario::Category;
 use lanesweep::stats::density::DensityModel;
 use lanesweep::{Error, Result};
-
-fn density(category: Category, key: &str, with_thw: bool) -> DensityModel {
-    fitted(scenarios(), category, key, with_thw)
-}
 
 /// A tally of all samples in chunks of `chunk_lanes` lanes.
 fn tally(
@@ -39,9 +36,10 @@ fn a_device_counts_what_the_host_counts() {
         (Category::CutOut, "f", false, 1500),
         (Category::Lvd, "ii", true, 1500),
     ] {
-        let density = density(category, key, with_thw);
+        let density = density_of(24, category, key, with_thw);
         let headways = if with_thw { SampleHeadways::Sampled } else { each() };
-        let options = SampleOptions::new(Estimator::Crude, n, headways);
+        let models = vec![ModelId::Reg157, ModelId::Fsm];
+        let options = SampleOptions { models, ..SampleOptions::new(Estimator::Crude, n, headways) };
         let expected = tally(&density, &options, &cpu, None).unwrap();
         assert!(expected.failures.iter().sum::<u64>() > 0 && expected.by_kernel.is_some(), "{key}");
         for chunk_lanes in [None, Some(4_000)] {
@@ -53,9 +51,9 @@ fn a_device_counts_what_the_host_counts() {
 
 #[test]
 fn a_wrong_count_stops_the_run() {
-    let density = density(Category::CutIn, "2", false);
+    let density = density_of(24, Category::CutIn, "2", false);
     let headways = SampleHeadways::Each([0.5, 1.0].map(Headway::ThwS).to_vec());
-    let options = SampleOptions::new(Estimator::Crude, 1500, headways);
+    let options = SampleOptions { models: vec![ModelId::Fsm], ..SampleOptions::new(Estimator::Crude, 1500, headways) };
     for (from, to) in [
         ("failed * failed", "failed + failed"),
         ("point.component % tally_groups", "(point.component + 1u) % tally_groups"),

@@ -2,9 +2,8 @@
 
 use std::path::Path;
 
-use crate::common;
 use crate::common::device::software_device;
-use crate::common::program::{json, ran, said};
+use crate::common::program::{files, json, ran, said, same, without_host};
 
 /// `--device` with the index of the software device.
 fn device() -> Option<String> {
@@ -27,27 +26,13 @@ fn a_study_on_a_device_writes_the_same_files_as_on_the_cpu() {
     };
     let on_cpu = study("cpu", "--backend cpu");
     assert!(on_cpu == study("device", &format!("--backend gpu --device {device}")), "the tables differ");
-    let mut files = 0;
-    for name in common::program::names(&dir.path().join("cpu")) {
-        let read = |folder: &str| std::fs::read(dir.path().join(folder).join(&name)).unwrap();
-        if name == "run.json" {
-            let record = json(&dir.path().join("device/run.json"));
-            assert_eq!(record["device"]["exact_path"], true);
-            assert_eq!(record["sweep"]["redone_lanes"], 0);
-            let (lanes, rechecked) = (record["lanes"].as_u64(), record["sweep"]["rechecked_lanes"].as_u64());
-            assert!(rechecked.unwrap() >= lanes.unwrap() / 1000, "{record}");
-        } else if name == "report.html" {
-            // All but what tells of the machine.
-            let page = |folder: &str| String::from_utf8(read(folder)).unwrap();
-            let parts = ["cpu", "device"].map(|folder| common::page::without_host(&page(folder)));
-            assert!(parts[0] == parts[1] && page("device").contains("exact path"));
-        } else if name != "lanesweep-files.json" {
-            // The list has the checksums of record and page.
-            assert!(read("cpu") == read("device"), "{name}");
-            files += 1;
-        }
-    }
-    assert!(files >= 8, "{files} files");
+    let [cpu, on_device] = ["cpu", "device"].map(|folder| without_host(files(&dir.path().join(folder))));
+    same(&on_device, &cpu, "device");
+    assert!(cpu.len() >= 10 && cpu.contains_key("lanes.csv"), "{:?}", cpu.keys());
+    let record = json(&dir.path().join("device/run.json"));
+    assert_eq!((&record["device"]["exact_path"], &record["sweep"]["redone_lanes"]), (&true.into(), &0.into()));
+    let (lanes, rechecked) = (record["lanes"].as_u64(), record["sweep"]["rechecked_lanes"].as_u64());
+    assert!(rechecked.unwrap() >= lanes.unwrap() / 1000, "{record}");
 }
 
 #[test]

@@ -3,7 +3,7 @@
 //! verify` asks the same of any other.
 
 use crate::common::device::{open, patched, tampered};
-use crate::common::lane_sets::{forms, random, small_study, small_study_of, thresholds};
+use crate::common::lane_sets::{forms, of_model, random, small_study, small_study_of, thresholds};
 use lanesweep::engine::gpu::{GpuOptions, Tampering};
 use lanesweep::engine::verify::{Comparison, compare, self_check};
 use lanesweep::engine::{Backend, Chunk, CpuBackend, Headway, LanePlan, Wanted, same_words};
@@ -24,29 +24,8 @@ fn assert_equal(what: &str, comparison: &Comparison) {
     assert!(comparison.is_equal(), "{what}: {worst:#?}, modes {}", comparison.modes_differing);
 }
 
-#[test]
-fn every_word_of_a_small_study_equals_the_cpus() {
-    let Some(gpu) = open(GpuOptions::default()) else { return };
-    assert!(gpu.is_exact());
-    let plan = small_study();
-    let comparison = compare("study", &plan, &gpu, |_| ()).unwrap();
-    assert_equal("study", &comparison);
-    assert_eq!(comparison.lanes(), plan.lane_count());
-}
-
-#[test]
-fn lanes_that_start_from_their_recorded_gaps_are_equal() {
-    let Some(gpu) = open(GpuOptions::default()) else { return };
-    let plan = small_study_of(StudyOptions { headways: vec![Headway::Observed], ..StudyOptions::default() });
-    let comparison = compare("observed", &plan, &gpu, |_| ()).unwrap();
-    assert_equal("observed", &comparison);
-    assert_eq!(comparison.lanes(), plan.lane_count());
-}
-
 /// The regulation's distance between vehicles, at speeds of every part of its table.
-#[test]
-fn lanes_that_start_at_the_minimum_following_distance_are_equal() {
-    let Some(gpu) = open(GpuOptions::default()) else { return };
+fn at_the_minimum_following_distance() -> LanePlan {
     let axis = |key, from, to, step| GridAxis::range(Category::CutIn, key, (from, to), step).unwrap();
     let grid = Grid::new(GridParts {
         name: "following".to_owned(),
@@ -58,12 +37,25 @@ fn lanes_that_start_at_the_minimum_following_distance_are_equal() {
         style: CaseStyle::Plain,
         native_gap: false,
         closing_only: false,
-    })
-    .unwrap();
+    });
     let profile = Profile::load("un-r157").unwrap();
-    let mut plan = GridPlan::new(grid, &profile, &ModelId::ALL).unwrap().parts.remove(0).plan;
+    let mut plan = GridPlan::new(grid.unwrap(), &profile, &ModelId::ALL).unwrap().parts.remove(0).plan;
     plan.headways = vec![Headway::MinFollowing];
-    assert_equal("following", &compare("following", &plan, &gpu, |_| ()).unwrap());
+    plan
+}
+
+#[test]
+fn every_word_of_small_studies_and_of_every_kind_of_start_equals_the_cpus() {
+    let Some(gpu) = open(GpuOptions::default()) else { return };
+    assert!(gpu.is_exact());
+    let observed = small_study_of(StudyOptions { headways: vec![Headway::Observed], ..StudyOptions::default() });
+    for (what, plan) in
+        [("study", small_study()), ("observed", observed), ("following", at_the_minimum_following_distance())]
+    {
+        let comparison = compare(what, &plan, &gpu, |_| ()).unwrap();
+        assert_equal(what, &comparison);
+        assert_eq!(comparison.lanes(), plan.lane_count());
+    }
 }
 
 #[test]
@@ -92,7 +84,7 @@ fn lanes_are_equal_under_every_form_of_every_option_and_at_other_time_steps() {
 
 #[test]
 fn the_cut_into_jobs_and_into_calls_changes_no_word() {
-    let plan = random(&Profile::load("paper").unwrap(), 2000);
+    let plan = random(&Profile::load("paper").unwrap(), 600);
     let cpu = run(&CpuBackend::lane_arithmetic(), &plan, Wanted::Outcomes);
     for first_lanes in [1, 77, 1 << 22] {
         let Some(gpu) = open(GpuOptions { first_lanes, ..Default::default() }) else { return };
@@ -113,26 +105,21 @@ fn the_cut_into_jobs_and_into_calls_changes_no_word() {
 #[test]
 fn an_invocation_that_computes_many_lanes_writes_the_same_words() {
     let profile = Profile::load("paper").unwrap();
-    let (many, few) = (random(&profile, 3000), random(&profile, 7));
     // With more, llvmpipe ends the loop: there the first invocations take all lanes of a workgroup.
-    for lanes in [2, 3] {
+    for (lanes, size) in [(2, 7), (3, 3000)] {
         let lanes_per_invocation = Some(lanes);
         let options = GpuOptions { lanes_per_invocation, split_scenes: Some(true), ..Default::default() };
         let Some(gpu) = open(options) else { return };
-        for plan in [&many, &few] {
-            let what = format!("{lanes} lanes per invocation");
-            assert_equal(&what, &compare("random", plan, &gpu, |_| ()).unwrap());
-        }
-        assert_equal("study", &compare("study", &small_study(), &gpu, |_| ()).unwrap());
+        let plan = random(&profile, size);
+        assert_equal(&format!("{lanes} lanes"), &compare("random", &plan, &gpu, |_| ()).unwrap());
     }
 }
 
-/// What `verify` says of a device whose shaders have one text replaced.
-fn shader_patch(from: &str, to: &str) -> Option<Comparison> {
+/// What `verify` says of these lanes on a device whose shaders have one text replaced.
+fn shader_patch(from: &str, to: &str, [random, thresholds]: [LanePlan; 2]) -> Option<Comparison> {
     let gpu = patched(from, to)?;
-    let profile = Profile::load("paper").unwrap();
-    let mut found = compare("random", &random(&profile, 4000), &gpu, |_| ()).unwrap();
-    let thresholds = compare("thresholds", &thresholds(&profile, 8), &gpu, |_| ()).unwrap();
+    let mut found = compare("random", &random, &gpu, |_| ()).unwrap();
+    let thresholds = compare("thresholds", &thresholds, &gpu, |_| ()).unwrap();
     found.tallies.extend(thresholds.tallies);
     found.worst.extend(thresholds.worst);
     Some(found)
@@ -140,12 +127,10 @@ fn shader_patch(from: &str, to: &str) -> Option<Comparison> {
 
 #[test]
 fn one_step_more_delay_in_a_shader_is_found_with_its_model() {
-    let Some(found) = shader_patch(
-        "DriverState(driver_coasting, driver_delay_steps)",
-        "DriverState(driver_coasting, driver_delay_steps + 1u)",
-    ) else {
-        return;
-    };
+    let right = "DriverState(driver_coasting, driver_delay_steps)";
+    let profile = Profile::load("paper").unwrap();
+    let lanes = [random(&profile, 1000), thresholds(&profile, 8)];
+    let Some(found) = shader_patch(right, &right.replace("_steps", "_steps + 1u"), lanes) else { return };
     assert!(!found.is_equal() && !found.worst.is_empty());
     assert!(found.tallies.iter().all(|t| (t.words_differing > 0) == (t.model.name() == "CCHDM")), "{found:?}");
     assert!(found.tallies.iter().any(|t| t.verdicts_differing > 0));
@@ -155,16 +140,17 @@ fn one_step_more_delay_in_a_shader_is_found_with_its_model() {
 fn one_unit_in_the_last_place_of_a_constant_is_found() {
     let plants = [
         // 1/12 in the Reg157 threshold.
-        ("dv * driver_half_inverse_deceleration", "driver_half_inverse_deceleration"),
-        ("driver_ttc * closes", "driver_ttc"),
-        ("v_ego * driver_tau", "driver_tau"),
-        ("v_ego * driver_response_time", "driver_response_time"),
-        ("limit = criteria_ttc_threshold", "criteria_ttc_threshold"),
-        ("closing * btn_ramp_delay", "btn_ramp_delay"),
+        (ModelId::Reg157, "dv * driver_half_inverse_deceleration", "driver_half_inverse_deceleration"),
+        (ModelId::Cchdm, "driver_ttc * closes", "driver_ttc"),
+        (ModelId::Fsm, "v_ego * driver_tau", "driver_tau"),
+        (ModelId::Rss, "v_ego * driver_response_time", "driver_response_time"),
+        (ModelId::Reg157, "limit = criteria_ttc_threshold", "criteria_ttc_threshold"),
+        (ModelId::Rss, "closing * btn_ramp_delay", "btn_ramp_delay"),
     ];
-    for (from, constant) in plants {
+    for (model, from, constant) in plants {
+        let lanes = of_model(&Profile::load("paper").unwrap(), model, 4000);
         let to = from.replace(constant, &format!("bitcast<f32>(bitcast<u32>({constant}) + 1u)"));
-        let Some(found) = shader_patch(from, &to) else { return };
+        let Some(found) = shader_patch(from, &to, lanes) else { return };
         assert!(!found.is_equal(), "{to} was not found");
     }
 }
@@ -181,7 +167,7 @@ fn one_wrong_value_without_a_verdict_is_found_under_its_name() {
     ];
     for (from, to, name) in plants {
         let Some(gpu) = patched(from, to) else { return };
-        let plan = random(&Profile::load("paper").unwrap(), 400);
+        let [plan, _] = of_model(&Profile::load("paper").unwrap(), ModelId::Fsm, 400);
         let found = compare("random", &plan, &gpu, |_| ()).unwrap();
         let is_named = found.worst.iter().all(|lane| lane.names() == [name]);
         assert!(found.worst.len() > 5 && is_named, "{to}: {:?}", found.worst);
@@ -192,7 +178,9 @@ fn one_wrong_value_without_a_verdict_is_found_under_its_name() {
 /// Steps that are skipped down to no gap at all: contacts and reactions are missed.
 #[test]
 fn a_jump_that_goes_too_far_is_found() {
-    let Some(found) = shader_patch("(next < lowest) | (next <= 0.0)", "(next <= 0.0)") else { return };
+    let profile = Profile::load("paper").unwrap();
+    let lanes = [random(&profile, 4000), thresholds(&profile, 8)];
+    let Some(found) = shader_patch("(next < lowest) | (next <= 0.0)", "(next <= 0.0)", lanes) else { return };
     assert!(found.modes_differing + found.tallies.iter().map(|t| t.verdicts_differing).sum::<u64>() > 0, "{found:?}");
 }
 
@@ -221,7 +209,7 @@ fn the_self_check_finds_what_the_plain_path_changes() {
     let Some(gpu) = tampered(GpuOptions::default(), plain) else { return };
     assert!(!gpu.is_exact());
     let profile = Profile::load("paper").unwrap();
-    let found = compare("random", &random(&profile, 20_000), &gpu, |_| ()).unwrap();
+    let found = compare("random", &random(&profile, 8_000), &gpu, |_| ()).unwrap();
     let differing: u64 = found.tallies.iter().map(|t| t.lanes_differing).sum();
     let verdicts: u64 = found.tallies.iter().map(|t| t.verdicts_differing).sum();
     println!("{}: {differing} of {} lanes, {verdicts} verdict bits differ", gpu.describe(), found.lanes());

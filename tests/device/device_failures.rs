@@ -47,34 +47,20 @@ fn a_healthy_device_computes_every_lane_itself_and_a_sample_is_checked() {
 }
 
 #[test]
-fn a_device_that_is_lost_at_any_job_leaves_complete_numbers() {
+fn a_device_that_is_lost_has_no_memory_or_does_not_answer_in_time_leaves_complete_numbers() {
     let plan = plan();
     let expected = expected(&plan);
-    for at_job in [0, 3] {
-        let Some(gpu) = tampered(GpuOptions::default(), lost_at(at_job)) else { return };
+    let slow = GpuOptions { timeout: Duration::from_millis(1), first_lanes: 1 << 20, ..Default::default() };
+    let lost = |at_job| tampered(GpuOptions::default(), lost_at(at_job));
+    let no_memory = tampered(GpuOptions::default(), out_of_memory_at(1));
+    for (what, gpu) in [("lost", lost(0)), ("lost", lost(3)), ("no memory", no_memory), ("slow", open(slow))] {
+        let Some(gpu) = gpu else { return };
         let (verdicts, summary) = swept(&plan, &gpu);
-        assert!(verdicts == expected, "lost at job {at_job}");
-        assert!(summary.redone_lanes > 0 && summary.lanes == plan.lane_count(), "{summary:?}");
-        // It stays lost, and says so.
-        assert!(matches!(gpu.prepare(&plan).err(), Some(Error::Device { .. })));
+        assert!(verdicts == expected && summary.lanes == plan.lane_count(), "{what}");
+        assert!(summary.redone_lanes > 0, "{what}: {summary:?}");
+        // A lost one stays lost, and says so.
+        assert!(what != "lost" || matches!(gpu.prepare(&plan).err(), Some(Error::Device { .. })));
     }
-}
-
-#[test]
-fn a_device_without_memory_leaves_complete_numbers() {
-    let plan = plan();
-    let Some(gpu) = tampered(GpuOptions::default(), out_of_memory_at(1)) else { return };
-    let (verdicts, summary) = swept(&plan, &gpu);
-    assert!(verdicts == expected(&plan) && summary.redone_lanes > 0, "{summary:?}");
-}
-
-#[test]
-fn a_device_that_does_not_answer_in_time_leaves_complete_numbers() {
-    let plan = plan();
-    let timeout = Duration::from_millis(1);
-    let Some(gpu) = open(GpuOptions { timeout, first_lanes: 1 << 20, ..Default::default() }) else { return };
-    let (verdicts, summary) = swept(&plan, &gpu);
-    assert!(verdicts == expected(&plan) && summary.redone_lanes > 0, "{summary:?}");
 }
 
 #[test]

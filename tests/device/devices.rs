@@ -1,7 +1,8 @@
 //! `lanesweep devices` on a machine with a software device, and on one with none.
 
+use std::process::Command;
+
 use crate::common::device::software_device;
-use assert_cmd::Command;
 use lanesweep::engine::BackendChoice;
 use lanesweep::engine::gpu::choose;
 

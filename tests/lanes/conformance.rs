@@ -6,7 +6,7 @@
 use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 
-use lanesweep::engine::{Constants, EndReason, LaneCase, NO_STEP, Outcome, Silent, Start, Step};
+use lanesweep::engine::{Constants, EndReason, LaneCase, NO_STEP, Outcome, Start, Step};
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::{DriverProfile, ModelId};
 use lanesweep::model::profile::Profile;
@@ -16,6 +16,7 @@ use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOp
 use lanesweep::scenario::{Case, Category, Tables, read_scenarios};
 
 use crate::common;
+use crate::common::lane_sets::run_lane;
 
 /// Maximum difference of values on robust rows.
 const TOLERANCE: f64 = 1e-6;
@@ -111,7 +112,7 @@ impl Replay {
         let lane = LaneCase::encode(&self.case, &self.profile, &mut tables);
         let constants = Constants::<f64>::resolve(&self.profile, self.case.category);
         let mut keep = |step: &Step<f64>| steps.push(*step);
-        let outcome = constants.run(self.model, &lane, &tables, Start::Gap(self.gap_m), &mut keep);
+        let outcome = run_lane(&constants, self.model, (&lane, &tables), Start::Gap(self.gap_m), &mut keep);
         let mut minima = [outcome.min_ttc, outcome.min_gap];
         if self.case.category == Category::CutOut {
             minima = last_target_minima(&self.profile, &lane, &tables, &steps);
@@ -319,7 +320,7 @@ fn run<R: Real>(
     start: Start<R>,
 ) -> Outcome<f64> {
     let at = Category::ALL.iter().position(|known| *known == category).unwrap();
-    constants[at].run(model, case, tables, start, &mut Silent).widen()
+    run_lane(&constants[at], model, (case, tables), start, &mut |_| ()).widen()
 }
 
 #[test]

@@ -1,13 +1,13 @@
 //! Values without a verdict: smallest THW, largest DRAC, TET, TIT, and the PET of a cut-in.
 
-use lanesweep::engine::{Constants, LaneRunner, Outcome, Silent, Start, Step};
+use lanesweep::engine::{Constants, LaneRunner, Outcome, Start, Step};
 use lanesweep::model::criterion::BtnContact;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::model::scalar::Real;
 use lanesweep::scenario::{Ahead, Case, Category, Lateral, Participant, Speed};
 
-use crate::common::lane_sets::{random, run_case};
+use crate::common::lane_sets::{random, run_case, run_lane};
 
 /// A profile whose FSM keeps its speed: its reaction time is longer than any run.
 fn unreacting(time_cap_s: f64) -> Profile {
@@ -34,7 +34,7 @@ fn cut_in(ego_mps: f64, other_mps: f64, horizon_s: f64) -> Case {
 const ENCROACHES_S: f64 = 1.68;
 
 fn run_in<R: Real>(profile: &Profile, case: &Case, model: ModelId, gap_m: f64) -> Outcome<f64> {
-    run_case(profile, case, model, Start::Gap(R::from_f64(gap_m)), &mut Silent)
+    run_case(profile, case, model, Start::Gap(R::from_f64(gap_m)), &mut |_| ())
 }
 
 /// In binary64, and in binary32 with the same result but for rounding.
@@ -208,7 +208,7 @@ fn every_value_is_that_of_its_definition_and_keeps_its_bounds() {
             let mut defined = Defined::default();
             let mut see = |step: &Step<f64>| defined.take(step, case.pair != 0);
             let (model, start) = (plan.models[key.model], plan.headways[key.headway].start());
-            let found = constants[key.block].run(model, &case, plan.tables(), start, &mut see);
+            let found = run_lane(&constants[key.block], model, (&case, plan.tables()), start, &mut see);
             let what = plan.key_text(&key);
             let same = |value: f64, expected: f64| {
                 let is_near = value == expected || (value - expected).abs() <= 1e-9 * (1.0 + expected.abs());

@@ -1,14 +1,12 @@
 //! Partial results are the same however a sweep is cut and in whatever order its parts come together.
 
-use crate::common::plans;
-
-use crate::common::plans::{chunk, mixed, plan};
+use crate::common::dice::cases;
+use crate::common::plans::{self, chunk, mixed, plan};
 use lanesweep::Place;
 use lanesweep::engine::{Chunk, LanePlan, Partial, Verdicts};
 use lanesweep::model::criterion::Criterion;
 use lanesweep::run::parts::{seal, unseal};
 use lanesweep::scenario::Category;
-use proptest::prelude::*;
 
 fn study() -> LanePlan {
     plan(&[(Category::CutIn, 4, &["1", "2"]), (Category::CutOut, 0, &["a"]), (Category::Lvd, 5, &["i"])])
@@ -37,48 +35,38 @@ fn read(text: &[u8]) -> lanesweep::Result<Partial> {
     Ok(unseal("part", text, &Place::item("part.json"), "compute this part again")?.0)
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
-
-    #[test]
-    fn any_cut_and_any_order_gives_the_same_partial(
-        seed: u64,
-        cuts in prop::collection::vec(0u64..10, 0..6),
-        order: u64,
-    ) {
-        let plan = study();
-        let mut borders: Vec<u64> = cuts.into_iter().chain([0, plan.unit_count()]).filter(|c| *c <= 9).collect();
+#[test]
+fn any_cut_and_any_order_gives_the_same_partial() {
+    let plan = study();
+    cases(48, |dice| {
+        let seed = dice.next();
+        let mut borders = [dice.list([0, 5], |dice| dice.below(10) as u64), vec![0, plan.unit_count()]].concat();
         borders.sort_unstable();
-        let mut parts: Vec<Partial> = borders
-            .windows(2)
-            .map(|w| Partial::from_chunk(&plan, &chunk(&plan, w[0]..w[1], &lane(seed), true)).unwrap())
-            .collect();
+        let part = |w: &[u64]| Partial::from_chunk(&plan, &chunk(&plan, w[0]..w[1], &lane(seed), true)).unwrap();
+        let mut parts: Vec<Partial> = borders.windows(2).map(part).collect();
         // Merge any two, again and again: any order and any bracketing.
-        let mut step = 0;
         while parts.len() > 1 {
-            let a = parts.swap_remove((mixed(order, step) % parts.len() as u64) as usize);
-            let at = (mixed(order, step + 1) % parts.len() as u64) as usize;
-            let b = parts.swap_remove(at);
+            let a = parts.swap_remove(dice.below(parts.len()));
+            let b = parts.swap_remove(dice.below(parts.len()));
             parts.push(a.merge(b).unwrap());
-            step += 2;
         }
-        let merged = parts.pop().unwrap();
-        let expected = whole(&plan, seed);
-        prop_assert_eq!(&merged, &expected);
-        prop_assert_eq!(text_of(&merged), text_of(&expected));
-        prop_assert!(merged.is_complete(&plan));
-    }
+        let (merged, expected) = (parts.pop().unwrap(), whole(&plan, seed));
+        assert_eq!(merged, expected);
+        assert_eq!(text_of(&merged), text_of(&expected));
+        assert!(merged.is_complete(&plan));
+    });
+}
 
-    #[test]
-    fn a_changed_digit_is_noticed(seed: u64, at in 0usize..4000) {
-        let text = text_of(&whole(&study(), seed));
-        let digits: Vec<usize> = text.bytes().enumerate().filter(|(_, b)| b.is_ascii_digit()).map(|(i, _)| i).collect();
-        let at = digits[at % digits.len()];
-        let mut bytes = text.into_bytes();
+#[test]
+fn a_changed_digit_is_noticed() {
+    cases(48, |dice| {
+        let mut bytes = text_of(&whole(&study(), dice.next())).into_bytes();
+        let digits: Vec<usize> = (0..bytes.len()).filter(|at| bytes[*at].is_ascii_digit()).collect();
+        let at = dice.one_of(&digits);
         bytes[at] = if bytes[at] == b'7' { b'3' } else { b'7' };
         let error = read(&bytes).unwrap_err();
-        prop_assert!(error.help().is_some(), "{}", error);
-    }
+        assert!(error.help().is_some(), "{error}");
+    });
 }
 
 #[test]

@@ -2,9 +2,11 @@
 
 use sha2::{Digest, Sha256};
 
+use crate::common::lane_sets::run_lane;
+
 use lanesweep::engine::ENGINE_VERSION;
 use lanesweep::engine::verify::{SetOptions, random_plan, threshold_plan};
-use lanesweep::engine::{Backend, Constants, CpuBackend, Headway, LanePlan, Outcome, Silent, Start, Wanted, words};
+use lanesweep::engine::{Backend, Constants, CpuBackend, Headway, LanePlan, Outcome, Start, Wanted, words};
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{SAMPLE_PURPOSE, generator_of};
@@ -127,7 +129,7 @@ fn samples(digests: &mut [Sha256; 2], profile: &Profile) {
             let mut tables = Tables::default();
             let case = generator.case(index, &mut tables);
             for model in models() {
-                let outcome = constants.run(model, &case, &tables, Start::Headway(0.8), &mut Silent);
+                let outcome = run_lane(&constants, model, (&case, &tables), Start::Headway(0.8), &mut |_| ());
                 add(digests, &outcome.widen());
             }
         }

@@ -1,7 +1,7 @@
 //! Cases made where lanes run: they mean what the host's cases mean, and every backend makes the same bits of them.
 
 use crate::common;
-use crate::common::mined::{fitted, provenance, scenarios_of};
+use crate::common::mined::{density_of, provenance, scenarios_of};
 
 use lanesweep::engine::{Backend, CpuBackend, Headway, Instructions, LaneCase, LanePlan, Wanted, words};
 use lanesweep::model::criterion::Criterion;
@@ -18,7 +18,7 @@ use lanesweep::stats::density::{DensityModel, FitOptions};
 use lanesweep::stats::random::Stream;
 
 fn density(category: Category, key: &str, with_thw: bool) -> DensityModel {
-    fitted(scenarios_of(12), category, key, with_thw)
+    density_of(12, category, key, with_thw)
 }
 
 fn options(samples: u64) -> SampleOptions {
@@ -120,20 +120,17 @@ fn draws_have_the_mean_and_the_spread_of_their_mixture_and_stay_valid() {
 fn samples_are_the_same_whatever_the_chunks_threads_and_instructions() {
     let profile = Profile::load("paper").unwrap();
     for id in Parameterization::ALL {
-        {
-            let n = 300;
-            let density = density(id.category, id.key, false);
-            let plan = plan_samples(&density, &profile, &options(n)).unwrap();
-            let whole = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
-            assert!(whole == outcomes(&plan, &CpuBackend::scalar(), &[0, 1, 37, n]), "{id:?} scalar, other chunks");
-            for instructions in Instructions::available() {
-                let backend = CpuBackend::with_instructions(instructions).unwrap();
-                assert!(whole == outcomes(&plan, &backend, &[0, n / 2, n]), "{id:?} {instructions}");
-            }
-            let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-            let alone = one.install(|| outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]));
-            assert!(whole == alone, "{id:?}: threads matter");
+        let n = 300;
+        let plan = plan_samples(&density(id.category, id.key, false), &profile, &options(n)).unwrap();
+        let whole = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
+        assert!(whole == outcomes(&plan, &CpuBackend::scalar(), &[0, 1, 37, n]), "{id:?} scalar, other chunks");
+        for instructions in Instructions::available() {
+            let backend = CpuBackend::with_instructions(instructions).unwrap();
+            assert!(whole == outcomes(&plan, &backend, &[0, n / 2, n]), "{id:?} {instructions}");
         }
+        let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        let alone = one.install(|| outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]));
+        assert!(whole == alone, "{id:?}: threads matter");
     }
 }
 
@@ -141,19 +138,19 @@ fn samples_are_the_same_whatever_the_chunks_threads_and_instructions() {
 fn a_device_makes_the_same_lanes_of_the_same_samples() {
     let Some(backend) = common::device::software_backend() else { return };
     let mut compared = 0;
-    for profile in ["paper", "un-r157"].map(|name| Profile::load(name).unwrap()) {
-        for id in Parameterization::ALL {
-            {
-                let n = 400;
-                let density = density(id.category, id.key, false);
-                let plan = plan_samples(&density, &profile, &options(n)).unwrap();
-                let ours = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
-                let theirs = outcomes(&plan, &*backend, &[0, 3, 150, n]);
-                let differing = ours.iter().zip(&theirs).filter(|(a, b)| a != b).count();
-                assert_eq!(differing, 0, "{} {}: of {} lanes", profile.name, id.key, ours.len());
-                compared += ours.len();
-            }
-        }
+    // Cases of every parameterization; of a category's first one for every driver, under a profile with other attention.
+    let firsts = Category::ALL.map(|of| Parameterization::ALL.into_iter().find(|id| id.category == of).unwrap());
+    let paper = Parameterization::ALL.map(|id| ("paper", id, vec![ModelId::Cchdm, ModelId::Fsm]));
+    let annex = firsts.map(|id| ("un-r157", id, ModelId::ALL.to_vec()));
+    for (name, id, models) in paper.into_iter().chain(annex) {
+        let n = 400;
+        let options = SampleOptions { models, ..options(n) };
+        let plan = plan_samples(&density(id.category, id.key, false), &Profile::load(name).unwrap(), &options).unwrap();
+        let ours = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
+        let theirs = outcomes(&plan, &*backend, &[0, 3, 150, n]);
+        let differing = ours.iter().zip(&theirs).filter(|(a, b)| a != b).count();
+        assert_eq!(differing, 0, "{name} {}: of {} lanes", id.key, ours.len());
+        compared += ours.len();
     }
     eprintln!("{compared} sampled lanes: 0 differ");
 }

@@ -44,7 +44,7 @@ fn this_machine_runs_what_it_says_and_refuses_the_rest() {
 fn random_lanes_and_lanes_on_thresholds_are_equal_under_every_profile() {
     for name in Profile::names() {
         let profile = Profile::load(name).unwrap();
-        assert_equal(name, &random(&profile, 1000));
+        assert_equal(name, &random(&profile, 500));
         assert_equal(name, &thresholds(&profile, 3));
     }
 }
@@ -53,7 +53,7 @@ fn random_lanes_and_lanes_on_thresholds_are_equal_under_every_profile() {
 fn lanes_are_equal_under_every_form_of_every_option_and_at_other_time_steps() {
     for profile in forms() {
         let what = format!("{:?} {:?}", profile.criteria, profile.frame);
-        assert_equal(&what, &random(&profile, 200));
+        assert_equal(&what, &random(&profile, 100));
         assert_equal(&what, &thresholds(&profile, 1));
     }
 }
@@ -82,7 +82,7 @@ fn any_number_of_headways_gives_the_same_words() {
 
 #[test]
 fn neither_threads_nor_calls_change_a_word() {
-    let plan = random(&Profile::load("paper").unwrap(), 2000);
+    let plan = random(&Profile::load("paper").unwrap(), 800);
     let runner = LaneRunner::<f32>::new(&plan);
     let scalar: Vec<Outcome<f64>> =
         (0..plan.lane_count()).map(|lane| runner.run(&plan.key(lane).unwrap()).widen()).collect();

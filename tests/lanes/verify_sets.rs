@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, HashSet};
 
+use crate::common::lane_sets::run_lane;
 use lanesweep::engine::verify::{SetOptions, Threshold, random_plan, threshold_plan};
 use lanesweep::engine::{Backend, Constants, CpuBackend, EndReason, LaneCase, LanePlan, Outcome, Step, Wanted};
 use lanesweep::model::criterion::Criterion;
@@ -94,7 +95,7 @@ fn first_step(plan: &LanePlan, block: usize, case: &LaneCase<f64>, headway: usiz
             first = step.seen[..1 + case.pair as usize].iter().map(|seen| (seen.view, seen.lateral)).collect();
         }
     };
-    constants.run(ModelId::Fsm, &case, &plan.tables().cast(), plan.headways[headway].start(), &mut observer);
+    run_lane(&constants, ModelId::Fsm, (&case, &plan.tables().cast()), plan.headways[headway].start(), &mut observer);
     first
 }
 

@@ -1,9 +1,6 @@
 //! What writing a table holds in memory does not grow with its rows; what reading and planning a small file of
 //! scenarios holds stays small.
-#![cfg(feature = "parquet")]
-
 use crate::common::tables::made;
-#[allow(dead_code)]
 use crate::memory;
 
 use std::fs::File;

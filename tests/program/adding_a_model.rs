@@ -4,13 +4,12 @@
 //! Of `.ci/long`, because it compiles our crates a second time (minutes):
 //! `cargo test --release --test commands adding_a_model:: -- --ignored`
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use crate::common::device::software_device;
-use crate::common::program::words;
+use crate::common::program::{Files, files, words};
 
 /// What a copy needs to be built.
 const SOURCES: [&str; 9] =
@@ -21,49 +20,34 @@ const RUST: &str = "src/model/driver/aeb.rs";
 const WGSL: &str = "shaders/aeb.wgsl";
 const REGISTRY: &str = "src/model/driver/registry.rs";
 
-type Tree = BTreeMap<String, Vec<u8>>;
-
-/// Every file below `root` that belongs to [`SOURCES`], by its path from there.
-fn sources(root: &Path) -> Tree {
-    fn add(tree: &mut Tree, root: &Path, at: &str) {
-        let path = root.join(at);
-        if path.is_dir() {
-            for entry in fs::read_dir(&path).unwrap() {
-                let name = entry.unwrap().file_name().into_string().unwrap();
-                add(tree, root, &format!("{at}/{name}"));
+/// A copy of the sources with the example's model: two files and a line after the registry's last. Only what differs is
+/// written, so that cargo sees from the times of the files that nothing else is to be built again.
+fn copy_with_the_example(root: &Path, copy: &Path) {
+    let mut tree = Files::new();
+    for at in SOURCES.map(str::to_owned) {
+        match root.join(&at) {
+            folder if folder.is_dir() => {
+                tree.extend(files(&folder).into_iter().map(|(name, content)| (format!("{at}/{name}"), content)));
             }
-        } else if path.exists() {
-            tree.insert(at.to_owned(), fs::read(path).unwrap());
+            file => drop(tree.insert(at, fs::read(file).unwrap())),
         }
     }
-    let mut tree = Tree::new();
-    SOURCES.iter().for_each(|at| add(&mut tree, root, at));
-    tree
-}
-
-/// Writes what differs, so that cargo sees from the times of the files that nothing else is to be built again.
-fn write(tree: &Tree, root: &Path) {
-    let present = sources(root);
-    present.keys().filter(|at| !tree.contains_key(*at)).for_each(|stale| fs::remove_file(root.join(stale)).unwrap());
-    for (at, content) in tree.iter().filter(|(at, content)| present.get(*at) != Some(content)) {
-        fs::create_dir_all(root.join(at).parent().unwrap()).unwrap();
-        fs::write(root.join(at), content).unwrap();
+    let read = |name: &str| fs::read(root.join("examples/adding-a-driver-model").join(name)).unwrap();
+    for (at, name) in [(RUST, "aeb.rs"), (WGSL, "aeb.wgsl")] {
+        assert!(tree.insert(at.to_owned(), read(name)).is_none(), "{at} is new");
     }
-}
-
-/// The sources with the example's model: two files and a line after the registry's last.
-fn with_the_example(ours: &Tree, example: &Path) -> Tree {
-    let read = |name: &str| fs::read(example.join(name)).unwrap();
-    let mut theirs = ours.clone();
-    assert!(theirs.insert(RUST.to_owned(), read("aeb.rs")).is_none(), "{RUST} is new");
-    assert!(theirs.insert(WGSL.to_owned(), read("aeb.wgsl")).is_none(), "{WGSL} is new");
     let line = String::from_utf8(read("registry-line.txt")).unwrap();
-    let registry = String::from_utf8(ours[REGISTRY].clone()).unwrap();
+    let registry = String::from_utf8(tree[REGISTRY].clone()).unwrap();
     let mut lines: Vec<&str> = registry.lines().collect();
     let last = lines.iter().rposition(|l| l.ends_with("\";")).expect("the registry has models");
     lines.insert(last + 1, line.trim_end());
-    theirs.insert(REGISTRY.to_owned(), (lines.join("\n") + "\n").into_bytes());
-    theirs
+    tree.insert(REGISTRY.to_owned(), (lines.join("\n") + "\n").into_bytes());
+    let present = files(copy);
+    present.keys().filter(|at| !tree.contains_key(*at)).for_each(|stale| fs::remove_file(copy.join(stale)).unwrap());
+    for (at, content) in tree.iter().filter(|(at, content)| present.get(*at) != Some(content)) {
+        fs::create_dir_all(copy.join(at).parent().unwrap()).unwrap();
+        fs::write(copy.join(at), content).unwrap();
+    }
 }
 
 /// Builds the program of the copy. Dependencies are those that are built already, because the folder of intermediate
@@ -112,14 +96,13 @@ fn said(output: &Output) -> String {
 fn a_model_is_one_rust_file_one_wgsl_file_and_one_registry_line() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let copy = Path::new(env!("CARGO_TARGET_TMPDIR")).join("adding-a-model");
-    let ours = sources(root);
-    write(&with_the_example(&ours, &root.join("examples/adding-a-driver-model")), &copy);
+    copy_with_the_example(root, &copy);
 
     let start = std::time::Instant::now();
     build(&copy);
     println!("built with the model in {:.0?}", start.elapsed());
     runs_one_case();
-    takes_its_constants_from_a_profile(&ours);
+    takes_its_constants_from_a_profile();
     stands_in_every_table_of_a_study();
     gives_the_same_words_on_a_device();
 }
@@ -146,9 +129,9 @@ fn runs_one_case() {
     assert!(help.contains("FSM, AEB"), "{help}");
 }
 
-fn takes_its_constants_from_a_profile(ours: &Tree) {
+fn takes_its_constants_from_a_profile() {
     let dir = tempfile::tempdir().unwrap();
-    let paper = String::from_utf8(ours["configs/profiles/paper.toml"].clone()).unwrap();
+    let paper = include_str!("../../configs/profiles/paper.toml");
     let with = |table: &str| {
         let path = dir.path().join("own.toml");
         fs::write(&path, format!("{paper}\n[aeb]\n{table}\n")).unwrap();

@@ -2,8 +2,8 @@
 //! in the table of contents, every verb is in the book, every flag exists.
 //!
 //! A chapter's ```` ```console ```` blocks run in an empty folder of the chapter's own, in order; what stands in a block
-//! `toml file=NAME` (any language) is a file there. Programs of the system, such as `head`, may be called too. `TRYCMD=overwrite cargo test --release --test commands book::commands -- --ignored` writes
-//! what the commands print into the chapters.
+//! `toml file=NAME` (any language) is a file there. `LANESWEEP_RENEW=1 cargo test --release --test commands book::commands --
+//! --ignored` writes what the commands print into the chapters.
 #![cfg(unix)]
 
 mod markdown;
@@ -13,15 +13,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Duration;
 
-use crate::common::program::{PROGRAM, ran};
+use rayon::prelude::*;
+
+use crate::common::program::ran;
+use crate::program::console;
 use crate::program::shell::verbs;
 use markdown::{Document, Link};
 use shell::commands;
-
-/// Programs of the system that a block may call; trycmd leaves out what it does not know.
-const TOOLS: [&str; 7] = ["cat", "cp", "grep", "head", "ls", "tail", "wc"];
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -62,45 +61,14 @@ fn documents() -> Vec<Document> {
 #[test]
 #[ignore = "half a minute and more: .ci/run long-tests"]
 fn commands_print_what_the_book_says() {
-    let work = tempfile::Builder::new().prefix("book").tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
-    let cases: Vec<(PathBuf, Document)> = chapters()
-        .into_iter()
-        .filter(|chapter| chapter.blocks().any(|block| block.language == "console"))
-        .map(|chapter| {
-            let name = chapter.path.trim_start_matches("docs/src/").replace('/', "-");
-            let case = work.path().join(name);
-            fs::write(&case, chapter.for_trycmd()).unwrap();
-            // An empty `.out` asks for a folder of the case's own, in which `.in` lies.
-            fs::create_dir(case.with_extension("out")).unwrap();
-            fs::create_dir(case.with_extension("in")).unwrap();
-            for (file, content) in chapter.files() {
-                fs::write(case.with_extension("in").join(file), content).unwrap();
-            }
-            (case, chapter)
-        })
-        .collect();
-    assert!(!cases.is_empty(), "no chapter has a console block");
-
-    let tests = trycmd::TestCases::new();
-    tests.case(work.path().join("*.md")).timeout(Duration::from_secs(600)).env("NO_COLOR", "1");
-    tests.register_bin("lanesweep", Path::new(PROGRAM));
-    tests.register_bins(TOOLS.map(|tool| (tool, on_path(tool))));
-    tests.run();
-
-    if std::env::var_os("TRYCMD").is_some_and(|mode| mode == "overwrite") {
-        for (case, chapter) in cases {
-            let text = markdown::from_trycmd(fs::read_to_string(case).unwrap());
-            if text != chapter.text {
-                fs::write(root().join(&chapter.path), text).unwrap();
-            }
-        }
-    }
-}
-
-fn on_path(program: &str) -> PathBuf {
-    let folders = std::env::var_os("PATH").unwrap_or_default();
-    let found = std::env::split_paths(&folders).map(|folder| folder.join(program)).find(|path| path.is_file());
-    found.unwrap_or_else(|| panic!("the book's commands need `{program}`"))
+    let chapters: Vec<Document> =
+        chapters().into_iter().filter(|chapter| chapter.blocks().any(|block| block.language == "console")).collect();
+    assert!(!chapters.is_empty(), "no chapter has a console block");
+    chapters.par_iter().for_each(|chapter| {
+        let dir = tempfile::tempdir().unwrap();
+        chapter.files().iter().for_each(|(file, content)| fs::write(dir.path().join(file), content).unwrap());
+        console::check(&root().join(&chapter.path), dir.path());
+    });
 }
 
 #[test]

@@ -70,13 +70,8 @@ fn every_answer_has_its_own_exit_status_and_the_sheet_begins_with_the_case_in_km
         + preventable under un-r157: CCHDM and FSM avoid the collision
         cut-in 108 36 20 2 = 1
         + not preventable under un-r157: CCHDM and FSM collide
-        # Equal speeds, a faster vehicle, one that the ego has passed.
         cut-in 60 60 12 1 = 9
         + no conflict under un-r157: nothing collides even if the ego never reacts
-        cut-in 60 70 12 1 = 9
-        + no conflict under un-r157:
-        cut-in 60 0 12 1 = 9
-        + no conflict under un-r157:
         # An ego that never reacts misses the cutter; CCHDM brakes, stays beside it, and is hit.
         cut-in 130 60 93 0.3 = 8
         + undecided under un-r157: an ego that never reacts does not collide; CCHDM reacts and collides
@@ -105,26 +100,14 @@ fn every_answer_has_its_own_exit_status_and_the_sheet_begins_with_the_case_in_km
 fn a_case_that_annex_3_does_not_describe_has_its_own_answer_and_the_edge_is_said() {
     agree(
         "
-        lvd --ego-speed 60km/h --speed 20km/h --gap 100 --acceleration=-0.01 = 10
+        lvd --ego-speed 60km/h --speed 59.8km/h --thw 0.5 --acceleration=-8 = 10
         + outside Annex 3 under un-r157: the ego is faster than the leader at the start
         + LVD under un-r157 (leader beyond 5 m/s², else the delay only):
-        lvd --ego-speed 60km/h --speed 59.8km/h --thw 0.5 --acceleration=-8 = 10
-        + outside Annex 3 under un-r157:
-        lvd --ego-speed 60km/h --speed 60km/h --thw 0.5 --acceleration=-8 = 1
-        + not preventable under un-r157:
         lvd --ego-speed 60km/h --speed 60.2km/h --thw 0.5 --acceleration=-8 = 10
-        + outside Annex 3 under un-r157:
-        cut-out --ego-speed 70km/h --lateral-speed 1.5 --ahead-gap 8 --thw 2.01 = 10
         + outside Annex 3 under un-r157:
         # It needs 1.9 s to clear the path, and covers 32 m in that time.
         cut-out --ego-speed 60km/h --lateral-speed 1 --ahead-gap 20 --thw 1.5 = 0
         + no such traffic: the vehicle that cuts out drives through the one ahead of it from 1.2 s on
-        # The table of distances names the edge too.
-        cut-out --ego-speed 70km/h --gap 38.8889 --lateral-speed 1.0 --ahead-gap 60 = 0
-        + preventable under un-r157:
-        + outside Annex 3
-        - leaves Annex 3
-        - no such traffic
         cut-out --ego-speed 70km/h --gap 38.965 --lateral-speed 1.0 --ahead-gap 60 = 0
         + preventable under un-r157:
         + the case leaves Annex 3 with gap + 1 cm
@@ -141,19 +124,15 @@ fn each_clause_has_its_demand_beside_the_drivers() {
         cut-in 60 45 24 1 --acceleration -5 = 1
         + UN R157, 5.2.5.2: no demand: (a) largest change of the other vehicle's speed is
         - has to avoid the collision (robust)
-        cut-in 60 45 24 1 = 0
-        + UN R157, 5.2.5.2: the system has to avoid the collision (robust)
-        - 5.2.5.1
         cut-in 60 40 15 1 --width 2.5 = 0
         + UN R157, 5.2.5.2: the system has to avoid the collision (robust)
+        - 5.2.5.1
         cut-in 60 30 24 2 = 0
         + preventable under un-r157:
         + that does not mean unavoidable
         cut-in 60 40 15 1 --lateral-distance 2.3 = 0
         + UN R157, 5.2.5.2: unknown whether the system has to avoid the collision
         - 5.2.5.2: no demand
-        cut-in 60 40 15 2 = 0
-        + UN R157, 5.2.5.2: no demand: (b)
         cut-in 60 45 7.2 1 --profiles un-r157,eu-2022-1426,eu-2022-1426-standing = 0
         + UN R157, 5.2.5.2: no demand: (c) TTC at lane intrusion is 0.628 s; the clause applies where it is > 0.6972 s
         + EU 2022/1426, 1.4.2: the system has to avoid the collision (lane intrusion by a front tyre 0.1 m within
@@ -161,10 +140,6 @@ fn each_clause_has_its_demand_beside_the_drivers() {
         # These profiles drop condition (b), so the regulation's clause is not judged.
         cut-in 60 40 15 1 --profiles paper = 0
         + preventable under paper:
-        - 5.2.5.2
-        - lane intrusion
-        cut-in 60 40 15 1 --profiles jrc-2021 = 0
-        + preventable under jrc-2021:
         - 5.2.5.2
         - lane intrusion
         # Each input of the case varies by its own error.

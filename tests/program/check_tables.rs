@@ -69,12 +69,9 @@ fn a_table_is_judged_whole_and_its_status_is_that_of_the_worst_row() {
         let rows: String = rows.iter().map(|&at| format!("{}\n", ROWS[at].0)).collect();
         file(dir, "cases.csv", &format!("{HEADER}{rows}"));
     };
-    for (rows, status, verdict) in [
-        (&[0, 1, 2, 3][..], 1, "not preventable"),
-        (&[2, 1, 0], 1, "not preventable"),
-        (&[1, 2], 0, "preventable"),
-        (&[2, 3], 9, "no conflict"),
-    ] {
+    for (rows, status, verdict) in
+        [(&[0, 1, 2, 3][..], 1, "not preventable"), (&[1, 2], 0, "preventable"), (&[2, 3], 9, "no conflict")]
+    {
         table(rows);
         let (code, out, error) = run(dir, "check cases.csv");
         assert_eq!(code, status, "{out} {error}");

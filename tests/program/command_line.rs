@@ -160,7 +160,8 @@ fn too_many_open_files_are_answered_with_their_limit() {
         let study = format!("study --scenarios {} --backend cpu --out {}", scenarios(), dir.path().display());
         let output = limited(&format!("-n {files}"), &study);
         let said = stderr(&output);
-        assert!([0, 6].contains(&code(&output)), "{files}: {said}");
+        // The system's loader needs files too, beside those that are open here.
+        assert!([0, 6, 127].contains(&code(&output)), "{files}: {said}");
         if code(&output) == 6 {
             assert!(said.contains("ulimit -n") && !said.contains("disk"), "{files}: {said}");
             refused += 1;

@@ -290,57 +290,27 @@ fn a_profile_with_an_unusual_constant_is_used_and_reported() {
         let case = "--category cut-in --ego-speed 60km/h --speed 40km/h --gap 15 --lateral-speed 1";
         said(dir, &format!("check {case} --profiles own.toml"))
     };
-    for (old, new, expected) in [
-        (
-            "wandering_m = 0.375",
-            "wandering_m = 37.5",
-            Some("`cchdm.wandering_m`: 37.5 m is used as it is, shipped profiles have 0.375"),
-        ),
-        (
-            "\ndelay_s = 0.75",
-            "\ndelay_s = 0.06",
-            Some("`cchdm.delay_s`: 0.06 s is used as it is, shipped profiles have 0.6 to 0.75"),
-        ),
-        (
-            "jerk_mps3 = 12.65",
-            "jerk_mps3 = 1.29",
-            Some("`fsm.jerk_mps3`: 1.29 m/s³ is used as it is, shipped profiles have 12.65"),
-        ),
-        (
-            "lane_intrusion_m = 0.3 ",
-            "lane_intrusion_m = 3.0 ",
-            Some("`reg157.lane_intrusion_m`: 3 m is used as it is, shipped profiles have 0.3"),
-        ),
-        ("ttc_s = 2.0", "ttc_s = 0.2", Some("`cchdm.ttc_s`: 0.2 s is used as it is, shipped profiles have 2")),
-        ("reaction_time_s = 0.75", "reaction_time_s = 5.0", None),
-        ("reaction_time_s = 0.75", "reaction_time_s = 0.1", None),
-        ("lateral_acceleration_mps2 = 1.0", "lateral_acceleration_mps2 = 0.8", None),
-    ] {
-        let (code, text) = check(old, new);
-        assert!([0, 1, 8].contains(&code), "{code}: {text}");
-        match expected {
-            Some(expected) => assert!(text.contains(expected), "{expected}: {text}"),
-            None => assert!(!text.contains("is used as it is"), "{text}"),
+    // A line of the profile, what stands there instead, and what is said: of what is used (`+`), and of what is not (`-`).
+    let table = "\
+wandering_m = 0.375 | 37.5 | + `cchdm.wandering_m`: 37.5 m is used as it is, shipped profiles have 0.375
+\\ndelay_s = 0.75 | 0.06 | + `cchdm.delay_s`: 0.06 s is used as it is, shipped profiles have 0.6 to 0.75
+jerk_mps3 = 12.65 | 1.29 | + `fsm.jerk_mps3`: 1.29 m/s³ is used as it is, shipped profiles have 12.65
+lane_intrusion_m = 0.3 | 3.0 | + `reg157.lane_intrusion_m`: 3 m is used as it is, shipped profiles have 0.3
+ttc_s = 2.0 | 0.2 | + `cchdm.ttc_s`: 0.2 s is used as it is, shipped profiles have 2
+reaction_time_s = 0.75 | 5.0 | +
+reaction_time_s = 0.75 | 0.1 | +
+lateral_acceleration_mps2 = 1.0 | 0.8 | +
+reaction_time_s = 0.75 | 75.0 | - `fsm.reaction_time_s`: 75 is not usable; expected 0, or 0.001 to 60 s
+btn_threshold = 0.8 | 80.0 | - `criteria.btn_threshold`: 80 is not usable; expected 0.001 to 10
+comfortable_deceleration_mps2 = 4.0 | 9.0 | - `fsm.comfortable_deceleration_mps2`: 9 is above `fsm.max_surrogate_deceleration_mps2`, 6";
+    for line in table.lines() {
+        let [old, value, expected] = line.split(" | ").collect::<Vec<_>>()[..] else { panic!("{line}") };
+        let old = old.replace("\\n", "\n");
+        let (code, text) = check(&old, &format!("{} = {value}", old.split(" = ").next().unwrap()));
+        match expected.split_at(1) {
+            ("+", "") => assert!([0, 1, 8].contains(&code) && !text.contains("is used as it is"), "{line}: {text}"),
+            ("+", said) => assert!([0, 1, 8].contains(&code) && text.contains(said.trim()), "{line}: {code} {text}"),
+            (_, said) => assert!(code == 2 && text.contains(said.trim()), "{line}: {code} {text}"),
         }
-    }
-    for (old, new, expected) in [
-        (
-            "reaction_time_s = 0.75",
-            "reaction_time_s = 75.0",
-            "`fsm.reaction_time_s`: 75 is not usable; expected 0, or 0.001 to 60 s",
-        ),
-        (
-            "btn_threshold = 0.8",
-            "btn_threshold = 80.0",
-            "`criteria.btn_threshold`: 80 is not usable; expected 0.001 to 10",
-        ),
-        (
-            "comfortable_deceleration_mps2 = 4.0",
-            "comfortable_deceleration_mps2 = 9.0",
-            "`fsm.comfortable_deceleration_mps2`: 9 is above `fsm.max_surrogate_deceleration_mps2`, 6",
-        ),
-    ] {
-        let (code, text) = check(old, new);
-        assert!(code == 2 && text.contains(expected), "{expected}: {code} {text}");
     }
 }

@@ -1,6 +1,6 @@
 //! Rates of samples beside those of the recorded scenarios: which of them are sound.
 
-use crate::common::mined::{fitted, scenarios_of};
+use crate::common::mined;
 use lanesweep::Place;
 use lanesweep::engine::{CpuBackend, Executor, Headway};
 use lanesweep::model::criterion::Criterion;
@@ -12,7 +12,7 @@ use lanesweep::stats::density::DensityModel;
 use lanesweep::stats::estimate::{Verdict, Warning};
 
 fn density_of(key: &str, with_thw: bool) -> DensityModel {
-    fitted(scenarios_of(30), Category::CutIn, key, with_thw)
+    mined::density_of(30, Category::CutIn, key, with_thw)
 }
 
 fn density(key: &str) -> DensityModel {

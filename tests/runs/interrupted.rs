@@ -1,14 +1,12 @@
 //! What an interrupted run leaves behind: its exit status, and no half-written file.
 #![cfg(unix)]
 
-use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::Child;
 use std::time::{Duration, Instant};
 
-use crate::common::program::{self, PATIENCE, names, send, start, wait_for_run, wait_until, words};
+use crate::common::program::{self, names, send, start, wait_for_run, wait_until, words};
 use lanesweep::Error;
-use lanesweep::cli::signals;
 use lanesweep::engine::verify::{SetOptions, random_plan};
 use lanesweep::engine::{CpuBackend, Executor, Wanted};
 use lanesweep::model::profile::Profile;
@@ -64,25 +62,32 @@ fn long_scenarios(path: &Path) {
     std::fs::write(path, (0..10).map(line).collect::<String>()).unwrap();
 }
 
+/// The first chunk alone, a scenario, takes 15 s.
 #[test]
-fn a_signal_ends_a_run_within_five_seconds_also_in_its_first_chunk() {
+fn a_signal_ends_a_run_within_five_seconds_also_in_its_first_chunk_and_a_second_one_at_once() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    // The first chunk alone, a scenario, takes 15 s.
     long_scenarios(&dir.join("long.jsonl"));
     let long = "--config study.reference=true --dt 0.0001 --scenarios long.jsonl --out out";
-    let mut study = start(dir, &words(&format!("-q --threads 1 study {long}")));
-    wait_for_run(&mut study, "the folder is locked", || dir.join("out/run.lock").exists());
-    // The first chunk begins.
-    std::thread::sleep(Duration::from_millis(500));
-    send("TERM", study.id());
-    let sent = Instant::now();
-    let (code, said) = ended(study);
-    let waited = sent.elapsed();
+    let signalled = |signals: &[&str]| {
+        let mut study = start(dir, &words(&format!("-q --threads 1 study {long}")));
+        wait_for_run(&mut study, "the folder is locked", || dir.join("out/run.lock").exists());
+        for signal in signals {
+            std::thread::sleep(Duration::from_millis(500));
+            send(signal, study.id());
+        }
+        let sent = Instant::now();
+        let (code, said) = ended(study);
+        (code, said, sent.elapsed())
+    };
+    let (code, said, waited) = signalled(&["TERM"]);
     // A second for a machine that is busy with other tests.
     assert!(waited < Duration::from_secs(6), "{waited:?}: {said}");
     assert!(code == 75 && said.contains("the same command continues"), "{code:?}: {said}");
     assert!(!dir.join("out/run.lock").exists(), "the lock goes");
+    let (code, said, waited) = signalled(&["INT", "TERM"]);
+    assert!(code == 143 && waited < Duration::from_secs(1), "{code}, {waited:?}: {said}");
+    assert!(said.contains("ending after the present chunk; again to end at once"), "{said}");
 }
 
 #[test]
@@ -107,44 +112,6 @@ fn a_study_that_is_interrupted_leaves_no_half_written_file() {
         Some(mask) if mask & 1 == 0 => assert_eq!(study_interrupted_by("HUP"), 75),
         _ => eprintln!("SKIPPED: needs Linux, and SIGHUP not ignored"),
     }
-}
-
-#[test]
-fn a_resumable_run_notes_the_first_signal_and_ends_at_once_by_the_second() {
-    let mut run = Command::new(std::env::current_exe().unwrap())
-        .args(["--exact", "runs::interrupted::the_resumable_run", "--nocapture"])
-        .env(RESUMABLE_RUN, "1")
-        .stdout(Stdio::null())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut lines = BufReader::new(run.stderr.take().unwrap()).lines().map(|line| line.unwrap());
-    assert!(lines.any(|line| line == "at work"));
-    send("INT", run.id());
-    // The run sees the request before or after the user reads of it.
-    let mut said: Vec<String> = lines.by_ref().take(2).collect();
-    said.sort();
-    assert_eq!(said, ["ending after the present chunk; again to end at once", "noted"]);
-    send("TERM", run.id());
-    wait_until("the process ends", || run.try_wait().unwrap().is_some());
-    assert_eq!(run.wait().unwrap().code(), Some(143));
-}
-
-const RESUMABLE_RUN: &str = "LANESWEEP_TEST_RESUMABLE_RUN";
-
-/// The process that the test above interrupts; nothing by itself.
-#[test]
-fn the_resumable_run() {
-    if std::env::var_os(RESUMABLE_RUN).is_none() {
-        return;
-    }
-    signals::install();
-    let _guard = signals::CANCEL.resumable();
-    assert!(!signals::CANCEL.requested());
-    eprintln!("at work");
-    wait_until("the first signal", || signals::CANCEL.requested());
-    eprintln!("noted");
-    std::thread::sleep(PATIENCE);
 }
 
 #[test]

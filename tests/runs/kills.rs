@@ -88,10 +88,8 @@ fn results(dir: &Path) -> Files {
 fn put(dir: &Path, from: Option<&str>) {
     let _ = std::fs::remove_dir_all(dir.join("out"));
     std::fs::create_dir(dir.join("out")).unwrap();
-    for name in from.map_or(Vec::new(), |from| names(&dir.join(from))) {
-        let to = dir.join("out").join(&name);
-        std::fs::create_dir_all(to.parent().unwrap()).unwrap();
-        std::fs::copy(dir.join(from.unwrap()).join(&name), to).unwrap();
+    if let Some(from) = from {
+        program::copy(&dir.join(from), &dir.join("out"));
     }
 }
 

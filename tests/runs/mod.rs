@@ -7,7 +7,6 @@ mod interrupted;
 mod kills;
 mod map;
 mod mechanisms;
-mod mutations;
 mod nothing_is_lost;
 mod observed;
 mod parts;

@@ -1,6 +1,6 @@
 //! `--thw observed`: each scenario from its recorded gap.
 
-use crate::common::mined::{fitted, kept, mined, scenarios_of};
+use crate::common::mined::{density_of, kept, mined, scenarios_of};
 use lanesweep::Error;
 use lanesweep::engine::{Headway, LaneKey, LaneRunner};
 use lanesweep::model::profile::Profile;
@@ -55,7 +55,7 @@ fn a_scenario_without_a_recorded_gap_is_named_and_a_mixture_of_headways_is_refus
 
 #[test]
 fn a_density_without_headways_cannot_draw_observed_ones() {
-    let density = fitted(scenarios_of(2), Category::CutIn, "2", false);
+    let density = density_of(2, Category::CutIn, "2", false);
     let options = SampleOptions::new(Estimator::Crude, 100, SampleHeadways::Each(vec![Headway::Observed]));
     let paper = Profile::load("paper").unwrap();
     let error = plan_samples(&density, &paper, &options).err().unwrap();

@@ -14,17 +14,11 @@ pub fn same(a: &Path, b: &Path) {
     program::same(&found, &expected, &format!("{} and {}", a.display(), b.display()));
 }
 
-pub const STUDY: &str = "-q study --synth-recordings 2 --published --backend cpu";
-pub const SAMPLE: &str = "-q sample densities/cut-in-2.json --samples 30000 --thw 0.6 --backend cpu";
+const STUDY: &str = "-q study --synth-recordings 2 --published --backend cpu";
+const SAMPLE: &str = "-q sample densities/cut-in-2.json --samples 30000 --thw 0.6 --backend cpu";
 
-pub fn density(dir: &Path) {
+fn density(dir: &Path) {
     ran(dir, "-q fit --synth-recordings 3 --categories cut-in --parameterizations 2 --out densities");
-}
-
-/// Importance sampling that can be split: with a proposal of a run before.
-pub fn weighted(dir: &Path) -> String {
-    ran(dir, &format!("{SAMPLE} --estimator is --models RSS --out pilot"));
-    format!("{SAMPLE} --estimator is --proposal pilot/proposal.json --models RSS,FSM")
 }
 
 #[test]
@@ -49,9 +43,6 @@ fn a_study_in_shards_is_the_study_in_one_piece() {
     let read = |path: &str| std::fs::read(dir.join(path)).unwrap();
     assert!(read("whole/run-plan.json") == read("plan/plan.json"), "the plan that a whole run leaves is the same file");
     let planned = "-q study --plan plan/plan.json --backend cpu --out";
-    (0..7).for_each(|shard| drop(ran(dir, &format!("{planned} seven --shard {shard}/7"))));
-    assert_eq!(ran(dir, "-q merge seven"), whole);
-    same(&dir.join("whole"), &dir.join("seven"));
     assert_eq!(ran(dir, &format!("{planned} planned")), whole);
     same(&dir.join("whole"), &dir.join("planned"));
 }
@@ -192,22 +183,19 @@ fn an_interrupted_run_continues_and_ends_as_if_undisturbed() {
     density(dir);
     let long = "-q sample densities/cut-in-2.json --backend cpu --samples 1000000 --thw 0.6 --threads 1 --out";
     ran(dir, &format!("{long} whole"));
-    for out in ["run", "parts --shard 0/1"] {
-        let mut interruptions = 0;
-        loop {
-            let (code, _, err) = lanesweep(dir, &words(&format!("{long} {out} --config run.stop_after_s=0.3")));
-            match code {
-                0 => break,
-                75 => assert!(flat(&err).contains("are done and kept") && err.contains("it continues"), "{err}"),
-                other => panic!("{other}: {err}"),
-            }
-            interruptions += 1;
-            assert!(interruptions < 200, "every run must come further: {err}");
+    let mut interruptions = 0;
+    loop {
+        let (code, _, err) = lanesweep(dir, &words(&format!("{long} parts --shard 0/1 --config run.stop_after_s=0.3")));
+        match code {
+            0 => break,
+            75 => assert!(flat(&err).contains("are done and kept") && err.contains("it continues"), "{err}"),
+            other => panic!("{other}: {err}"),
         }
-        assert!(interruptions > 0, "the run is too short to be interrupted");
+        interruptions += 1;
+        assert!(interruptions < 200, "every run must come further: {err}");
     }
+    assert!(interruptions > 0, "the run is too short to be interrupted");
     ran(dir, "-q merge parts");
-    same(&dir.join("whole"), &dir.join("run"));
     same(&dir.join("whole"), &dir.join("parts"));
 }
 

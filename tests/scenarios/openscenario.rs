@@ -3,9 +3,6 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use quick_xml::events::{BytesStart, Event};
-use quick_xml::reader::Reader;
-
 use crate::common::program::{done as good, flat, lanesweep, words};
 
 fn refused(dir: &Path, args: &[&str], status: i32, says: &str) {
@@ -25,36 +22,52 @@ impl Found {
     }
 }
 
-/// Every element in order; the document must be well-formed.
+/// Every element in order; the document must be well-formed, and no text stands outside of attributes.
 fn elements(text: &str) -> Vec<Found> {
-    let mut reader = Reader::from_str(text);
-    reader.config_mut().enable_all_checks(true);
-    let (mut above, mut found): (Vec<String>, Vec<Found>) = (Vec::new(), Vec::new());
-    let mut take = |above: &[String], start: &BytesStart| {
-        let name = start.name().as_ref().to_owned();
-        let attributes = start.attributes().map(|a| {
-            let a = a.unwrap();
-            let value = a.normalized_value(quick_xml::XmlVersion::Implicit1_0).unwrap().into_owned();
-            (a.key.as_ref().to_owned(), value)
-        });
-        found.push(Found { path: format!("{}/{name}", above.join("/")), attributes: attributes.collect() });
-        name
-    };
-    loop {
-        match reader.read_event().unwrap() {
-            Event::Start(start) => {
-                let name = take(&above, &start);
-                above.push(name);
-            }
-            Event::Empty(start) => drop(take(&above, &start)),
-            Event::End(_) => drop(above.pop()),
-            Event::Text(text) => assert!(text.into_inner().trim().is_empty(), "no text stands outside of attributes"),
-            Event::Eof => break,
-            _ => {}
+    let (mut above, mut found): (Vec<&str>, Vec<Found>) = (Vec::new(), Vec::new());
+    let declared = text.strip_prefix("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n").expect("a declaration");
+    for part in declared.split('<').skip(1) {
+        let (tag, outside) = part.split_once('>').expect("a tag ends");
+        assert!(outside.trim().is_empty(), "{outside}");
+        if let Some(name) = tag.strip_prefix('/') {
+            assert_eq!(above.pop(), Some(name));
+            continue;
+        }
+        let (name, mut rest) = tag.trim_end_matches('/').split_once(' ').unwrap_or((tag.trim_end_matches('/'), ""));
+        let mut attributes = HashMap::new();
+        while !rest.trim().is_empty() {
+            let (key, after) = rest.trim_start().split_once("=\"").expect("an attribute");
+            let (value, after) = after.split_once('"').expect("its end");
+            assert!(!key.contains(char::is_whitespace) && !value.contains(char::is_control), "{tag}");
+            assert!(attributes.insert(key.to_owned(), unescaped(value)).is_none(), "{key} twice");
+            rest = after;
+        }
+        found.push(Found { path: format!("{}/{name}", above.join("/")), attributes });
+        if !tag.ends_with('/') {
+            above.push(name);
         }
     }
     assert!(above.is_empty());
     found
+}
+
+fn unescaped(value: &str) -> String {
+    let mut parts = value.split('&');
+    let mut text = parts.next().unwrap().to_owned();
+    for part in parts {
+        let (entity, rest) = part.split_once(';').expect("an entity ends");
+        let number = |text: &str| text.strip_prefix('x').map_or(text.parse(), |hex| u32::from_str_radix(hex, 16));
+        text.push(match (entity, entity.strip_prefix('#')) {
+            ("lt", _) => '<',
+            ("gt", _) => '>',
+            ("amp", _) => '&',
+            ("quot", _) => '"',
+            ("apos", _) => '\'',
+            (_, code) => char::from_u32(number(code.expect("an entity of XML")).unwrap()).unwrap(),
+        });
+        text += rest;
+    }
+    text
 }
 
 /// What a player has of a vehicle.

@@ -106,14 +106,13 @@ fn compare(name: &str, scenarios: &[Scenario], category: Category, key: &str, sa
 }
 
 /// The benchmark's case that is in the book, at seeds of which the search finds one of both kernels, or both.
-#[test]
-fn the_book_s_own_case_is_held_whichever_kernel_the_search_finds() {
+fn is_held(seeds: &[u64]) {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/rare-failures/densities/synthetic-12-cut-in-2.json");
     let density = read_density(path.as_ref()).unwrap();
     let profile = Profile::load("paper").unwrap();
     // 3·10⁸ crude lanes, ± 1.6 %.
     let truth = 1.289e-5;
-    for seed in [102, 1, 7] {
+    for &seed in seeds {
         let goal = Goal { half_width: 0.4, max_draws: 100_000, max_crude: 10_000_000 };
         let estimate = adaptive_estimate(&density, &profile, (ModelId::Fsm, 2.2), &goal, seed);
         assert!(estimate.interval.holds(truth), "seed {seed}: {estimate:?}");
@@ -122,8 +121,19 @@ fn the_book_s_own_case_is_held_whichever_kernel_the_search_finds() {
 }
 
 #[test]
+fn the_book_s_own_case_is_held() {
+    is_held(&[102]);
+}
+
+#[test]
+#[ignore = "a quarter of a minute for each seed"]
+fn the_book_s_own_case_is_held_whichever_kernel_the_search_finds() {
+    is_held(&[102, 1, 7]);
+}
+
+#[test]
 fn importance_sampling_agrees_with_crude_monte_carlo_on_lanes() {
-    compare("default data", scenarios(), Category::CutIn, "1", 20_000_000);
+    compare("default data", scenarios(), Category::CutIn, "1", 6_000_000);
 }
 
 #[test]

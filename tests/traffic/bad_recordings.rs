@@ -7,7 +7,6 @@ use lanesweep::Error;
 use lanesweep::model::plausibility::Implausible;
 use lanesweep::traffic::trajectory::Track;
 use lanesweep::traffic::trajectory::highd;
-use proptest::prelude::*;
 
 /// The message has all of these and comes with advice.
 #[track_caller]
@@ -324,77 +323,4 @@ fn line_numbers_count_the_header_and_hold_with_windows_line_ends_and_blank_lines
     edited("tracks", |text| spoiled(text).replacen('\n', "\n\n\n", 1), &["line 7", "column `x`"]);
     edited("tracks", last, &["line 27", "column `x`"]);
     edited("tracks", |text| last(text).trim_end().to_owned(), &["line 27", "column `x`"]);
-}
-
-/// One damage to a file: what to do, where (as a part of the length), with what.
-type Damage = (u8, f64, f64, Vec<u8>);
-
-fn damaged(text: &str, damages: &[Damage]) -> Vec<u8> {
-    let mut bytes = text.as_bytes().to_vec();
-    for (kind, from, to, insert) in damages {
-        let at = |part: f64| ((bytes.len() as f64 * part) as usize).min(bytes.len());
-        let (from, to) = (at(from.min(*to)), at(from.max(*to)));
-        match kind % 5 {
-            0 => drop(bytes.splice(from..from, insert.iter().copied())),
-            1 => drop(bytes.splice(from..(from + insert.len()).min(bytes.len()), insert.iter().copied())),
-            2 => drop(bytes.drain(from..(from + insert.len()).min(bytes.len()))),
-            3 => {
-                let copy = bytes[from..to].to_vec();
-                drop(bytes.splice(to..to, copy));
-            }
-            _ => bytes.truncate(to),
-        }
-    }
-    bytes
-}
-
-fn damage() -> impl Strategy<Value = Damage> {
-    let telling = ["-", "\"", "\n", "\r", ",", ";", "NaN", "-9223372036854775808", "1e308", "\u{feff}", "0", ".", "e"];
-    let telling: Vec<String> = telling.iter().map(|text| (*text).to_owned()).chain(["9".repeat(40)]).collect();
-    let telling = prop::sample::select(telling);
-    let bytes = prop_oneof![telling.prop_map(String::into_bytes), prop::collection::vec(any::<u8>(), 1..12)];
-    (any::<u8>(), 0.0..=1.0f64, 0.0..=1.0f64, bytes)
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(1500))]
-
-    #[test]
-    fn no_damage_makes_the_reader_panic_or_give_a_broken_model(
-        damages in prop::collection::vec(damage(), 1..4), which in 0usize..3,
-    ) {
-        static TEXTS: std::sync::LazyLock<Texts> = std::sync::LazyLock::new(Texts::small);
-        let texts = [&TEXTS.tracks, &TEXTS.tracks_meta, &TEXTS.recording_meta];
-        let mut contents = texts.map(|text| text.clone().into_bytes());
-        contents[which] = damaged(texts[which], &damages);
-        match small::read_bytes([&contents[0], &contents[1], &contents[2]]) {
-            Ok(loaded) => {
-                let bytes = loaded.checksum_sha256.iter().map(|file| file.bytes as usize);
-                prop_assert!(bytes.eq(contents.iter().map(Vec::len)));
-                let recording = loaded.recording;
-                prop_assert!(recording.frame_rate_hz > 0.0 && recording.frame_rate_hz.is_finite());
-                prop_assert!(!recording.tracks.is_empty());
-                prop_assert!(recording.tracks.is_sorted_by(|a, b| a.id < b.id));
-                for carriageway in &recording.carriageways {
-                    prop_assert!(carriageway.lane_count() > 0);
-                    prop_assert!(carriageway.lane_lines_m.is_sorted_by(|a, b| a > b));
-                }
-                for track in &recording.tracks {
-                    prop_assert!(track.length_m > 0.0 && track.width_m > 0.0 && !track.is_empty());
-                    let lanes = recording.carriageways[track.carriageway].lane_count();
-                    prop_assert!(track.lane.len() == track.len());
-                    prop_assert!(track.lane.iter().all(|&lane| lane == u16::MAX || usize::from(lane) < lanes));
-                    for series in [&track.s_m, &track.d_m, &track.v_s_mps, &track.v_d_mps, &track.a_s_mps2] {
-                        prop_assert!(series.len() == track.len() && series.iter().all(|value| value.is_finite()));
-                    }
-                }
-            }
-            Err(error) => {
-                let message = error.to_string();
-                prop_assert!(message.contains("01_"), "names a file: {}", message);
-                prop_assert!(!matches!(error, Error::Internal(_)), "{}", message);
-                prop_assert!(error.help().is_some() && message.len() < 1000, "{}", message);
-            }
-        }
-    }
 }

@@ -1,5 +1,6 @@
 //! The synthetic recordings are physically possible, well-formed, and the same everywhere.
 
+use crate::common::mined::recordings;
 use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate, generate_one};
 use lanesweep::traffic::trajectory::{Recording, Track};
 use rayon::prelude::*;
@@ -8,11 +9,6 @@ use sha2::{Digest, Sha256};
 /// SHA-256 of the first twelve default recordings' data as [`digest`] writes it. It changes when the generator does,
 /// and then on purpose: every published default result changes with it.
 const DEFAULT_DIGEST: &str = "e070e1fefac703b2c818b9e4919b5b2b06d73352db96732935e6f188b82739f8";
-
-/// The first twelve of the default recordings: each is the same whatever their number.
-fn default_recordings() -> Vec<Recording> {
-    generate(&GeneratorOptions { recordings: 12, ..GeneratorOptions::default() }).unwrap()
-}
 
 /// Every field of every recording, numbers as their bits.
 fn digest(recordings: &[Recording]) -> String {
@@ -48,13 +44,11 @@ fn digest(recordings: &[Recording]) -> String {
 
 #[test]
 fn the_default_recordings_are_the_same_bits_on_every_machine_and_thread_count() {
-    let with_threads = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| digest(&default_recordings()))
-    };
-    let one = with_threads(1);
-    assert_eq!(one, with_threads(2), "one thread and two threads differ");
-    assert_eq!(one, DEFAULT_DIGEST, "the default recordings have changed");
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let options = GeneratorOptions { recordings: 2, ..GeneratorOptions::default() };
+    let one = pool.install(|| generate(&options).unwrap());
+    assert_eq!(digest(&one), digest(recordings(2)), "one thread and all threads differ");
+    assert_eq!(digest(recordings(12)), DEFAULT_DIGEST, "the default recordings have changed");
 }
 
 #[test]
@@ -74,9 +68,7 @@ fn one_recording_alone_is_the_one_among_all_and_another_seed_gives_another() {
 
 #[test]
 fn no_two_vehicles_overlap() {
-    let options = GeneratorOptions::default();
-    (0..options.recordings).into_par_iter().for_each(|index| {
-        let recording = generate_one(&options, index).unwrap();
+    recordings(28).par_iter().for_each(|recording| {
         let last = recording.tracks.iter().map(Track::last_frame).max().unwrap();
         let mut present: Vec<Vec<usize>> = vec![Vec::new(); last as usize + 1];
         for (i, track) in recording.tracks.iter().enumerate() {
@@ -109,7 +101,7 @@ fn speeds_and_accelerations_are_bounded_and_positions_are_their_integrals() {
     let (mut samples, mut above) = (0, 0);
     // Half of the last written digit of a position, of a speed over one step, and the same again.
     let digits = 0.005;
-    for recording in default_recordings() {
+    for recording in recordings(12) {
         let dt = 1.0 / recording.frame_rate_hz;
         for t in &recording.tracks {
             assert!(t.v_s_mps.iter().all(|v| (0.0..=60.0).contains(v)), "speed of {}/{}", recording.id, t.id);
@@ -139,7 +131,7 @@ fn speeds_and_accelerations_are_bounded_and_positions_are_their_integrals() {
 fn vehicles_appear_once_pass_through_the_window_of_the_camera_and_keep_in_the_lanes_of_their_road() {
     let options = GeneratorOptions::default();
     let end = options.duration_s * options.frame_rate_hz;
-    for recording in default_recordings() {
+    for recording in recordings(12) {
         let mut before = (0, 1);
         for track in &recording.tracks {
             let (what, now) = (format!("{}/{}", recording.id, track.id), (track.id, track.first_frame));

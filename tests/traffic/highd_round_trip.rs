@@ -4,10 +4,10 @@ use crate::common;
 
 use std::fs;
 
+use crate::common::dice::{Dice, cases};
 use crate::common::small;
 use lanesweep::traffic::trajectory::highd;
 use lanesweep::traffic::trajectory::{Carriageway, Loaded, NO_LANE, Recording, Track, VehicleClass};
-use proptest::prelude::*;
 
 fn read_back(recording: &Recording) -> Loaded {
     let dir = tempfile::tempdir().unwrap();
@@ -31,84 +31,78 @@ fn bits(recording: &Recording) -> Vec<u64> {
     lines.copied().chain(tracks).map(f64::to_bits).collect()
 }
 
-prop_compose! {
-    fn track()(
-        carriageway in 0usize..2,
-        sizes in [0.5..25.0f64, 0.5..3.0f64],
-        truck: bool,
-        first_frame in -5i64..2000,
-        samples in prop::collection::vec(
-            ([-500.0..500.0f64, -60.0..60.0f64], [0.0..50.0f64, -3.0..3.0f64, -9.0..9.0f64], prop::sample::select(vec![0u16, 1, 2, 9, NO_LANE])),
-            1..12,
-        ),
-    ) -> Track {
-        Track {
-            id: 0,
-            class: if truck { VehicleClass::Truck } else { VehicleClass::Car },
-            length_m: sizes[0],
-            width_m: sizes[1],
-            carriageway,
-            first_frame,
-            s_m: samples.iter().map(|sample| sample.0[0]).collect(),
-            d_m: samples.iter().map(|sample| sample.0[1]).collect(),
-            v_s_mps: samples.iter().map(|sample| sample.1[0]).collect(),
-            v_d_mps: samples.iter().map(|sample| sample.1[1]).collect(),
-            a_s_mps2: samples.iter().map(|sample| sample.1[2]).collect(),
-            lane: samples.iter().map(|sample| sample.2).collect(),
-        }
+fn track(dice: &mut Dice, id: u32, carriageway: usize) -> Track {
+    let samples = 1 + dice.below(11);
+    let mut series = |min: f64, max: f64| (0..samples).map(|_| dice.between(min, max)).collect::<Vec<f64>>();
+    let (s_m, d_m, v_s_mps) = (series(-500.0, 500.0), series(-60.0, 60.0), series(0.0, 50.0));
+    let (v_d_mps, a_s_mps2) = (series(-3.0, 3.0), series(-9.0, 9.0));
+    Track {
+        id,
+        class: dice.one_of(&[VehicleClass::Truck, VehicleClass::Car]),
+        length_m: dice.between(0.5, 25.0),
+        width_m: dice.between(0.5, 3.0),
+        carriageway,
+        first_frame: dice.below(2005) as i64 - 5,
+        lane: (0..samples).map(|_| dice.one_of(&[0, 1, 2, 9, NO_LANE])).collect(),
+        s_m,
+        d_m,
+        v_s_mps,
+        v_d_mps,
+        a_s_mps2,
     }
 }
 
-prop_compose! {
-    fn recording()(
-        mut tracks in prop::collection::vec(track(), 1..6),
-        which in 0usize..3,
-        rate in prop::sample::select(vec![25.0, 20.0, 10.0, 12.5, 29.97, 1.0 / 0.04]),
-        shift in -0.5..0.5f64,
-    ) -> Recording {
-        let upper = Carriageway { name: "1".to_owned(), lane_lines_m: vec![12.0 + shift, 8.3 + shift, 4.4] };
-        let lower = Carriageway { name: "2".to_owned(), lane_lines_m: vec![-16.0 + shift, -19.3, -23.4, -27.1 + shift] };
-        let carriageways = match which {
-            0 => vec![upper, lower],
-            1 => vec![upper],
-            _ => vec![lower],
-        };
-        for (at, track) in tracks.iter_mut().enumerate() {
-            track.id = 3 * at as u32 + 1;
-            track.carriageway %= carriageways.len();
-        }
-        Recording { id: "07".to_owned(), frame_rate_hz: rate, carriageways, tracks, synthetic: rate < 20.0 }
-    }
+fn recording(dice: &mut Dice) -> Recording {
+    let shift = dice.between(-0.5, 0.5);
+    let upper = Carriageway { name: "1".to_owned(), lane_lines_m: vec![12.0 + shift, 8.3 + shift, 4.4] };
+    let lower = Carriageway { name: "2".to_owned(), lane_lines_m: vec![-16.0 + shift, -19.3, -23.4, -27.1 + shift] };
+    let carriageways = dice.one_of(&[vec![upper.clone(), lower.clone()], vec![upper], vec![lower]]);
+    let vehicles = 1 + dice.below(5) as u32;
+    let tracks = (0..vehicles).map(|at| {
+        let carriageway = dice.below(carriageways.len());
+        track(dice, 3 * at + 1, carriageway)
+    });
+    let tracks = tracks.collect();
+    let rate = dice.one_of(&[25.0, 20.0, 10.0, 12.5, 29.97, 1.0 / 0.04]);
+    Recording { id: "07".to_owned(), frame_rate_hz: rate, carriageways, tracks, synthetic: rate < 20.0 }
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(96))]
-
-    #[test]
-    fn a_recording_survives_its_own_files_quantized_and_a_quantized_one_bit_for_bit(recording in recording()) {
+#[test]
+fn a_recording_survives_its_own_files_quantized_and_a_quantized_one_bit_for_bit() {
+    cases(96, |dice| {
+        let recording = recording(dice);
         let mut quantized = recording.clone();
         highd::quantize(&mut quantized).unwrap();
         let read = read_back(&quantized).recording;
-        prop_assert_eq!(&read, &quantized);
-        prop_assert_eq!(bits(&read), bits(&quantized));
+        assert_eq!(read, quantized);
+        assert_eq!(bits(&read), bits(&quantized));
         let mut again = quantized.clone();
         highd::quantize(&mut again).unwrap();
-        prop_assert_eq!(bits(&again), bits(&quantized), "quantizing twice changes nothing more");
+        assert_eq!(bits(&again), bits(&quantized), "quantizing twice changes nothing more");
         let read = read_back(&recording).recording;
-        prop_assert_eq!(bits(&read), bits(&quantized));
+        assert_eq!(bits(&read), bits(&quantized));
         // Position and half a size are each off by half a hundredth and a quarter of one, at most.
         for (a, b) in read.tracks.iter().zip(&recording.tracks) {
             for (a, b) in a.s_m.iter().zip(&b.s_m).chain(a.d_m.iter().zip(&b.d_m)) {
-                prop_assert!((a - b).abs() < 0.0076, "{} {}", a, b);
+                assert!((a - b).abs() < 0.0076, "{a} {b}");
             }
         }
-    }
+    });
 }
 
-proptest! {
-    /// The reader has its own way through the digits of a short number.
-    #[test]
-    fn numbers_have_the_bits_that_the_standard_library_reads(texts in prop::collection::vec("-?[0-9]{1,2}(\\.[0-9]{0,17})?(e-?[0-2])?", 8)) {
+/// A number: sign, one or two digits, up to 17 decimals, an exponent.
+fn number(dice: &mut Dice) -> String {
+    let mut digits = |[min, max]: [usize; 2]| dice.list([min, max], |dice| (b'0' + dice.below(10) as u8) as char);
+    let [whole, decimals] = [digits([1, 2]), digits([0, 17])].map(|digits| digits.into_iter().collect::<String>());
+    let point = if dice.below(4) > 0 { format!(".{decimals}") } else { String::new() };
+    format!("{}{whole}{point}{}", dice.one_of(&["", "-"]), dice.one_of(&["", "", "", "e0", "e1", "e2", "e-1", "e-2"]))
+}
+
+/// The reader has its own way through the digits of a short number.
+#[test]
+fn numbers_have_the_bits_that_the_standard_library_reads() {
+    cases(256, |dice| {
+        let texts = dice.list([8, 8], number);
         let mut tables = small::Texts::small();
         let line = tables.tracks.lines().position(|line| line.split(',').nth(1) == Some("5")).unwrap() + 1;
         for (at, text) in texts.iter().enumerate() {
@@ -118,9 +112,9 @@ proptest! {
         let read = tables.read().unwrap().recording;
         let track = read.tracks.iter().find(|track| track.id == 5).unwrap();
         for (text, value) in texts.iter().zip(&track.a_s_mps2) {
-            prop_assert_eq!(value.to_bits(), text.parse::<f64>().unwrap().to_bits(), "{}", text);
+            assert_eq!(value.to_bits(), text.parse::<f64>().unwrap().to_bits(), "{text}");
         }
-    }
+    });
 }
 
 #[test]

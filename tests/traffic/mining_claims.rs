@@ -1,11 +1,11 @@
 //! What the miner must do with traffic whose every event is known, because it was put there.
 
+use crate::common::dice::{Dice, cases};
 use lanesweep::scenario::{Category, Scenario, Side};
 use lanesweep::traffic::mining::lateral::{LaneChangeKind, lane_changes};
 use lanesweep::traffic::mining::longitudinal::{Longitudinal, longitudinal_events};
 use lanesweep::traffic::mining::{LaneChangeEnd, LateralOptions, LongitudinalOptions, MiningOptions, mine};
 use lanesweep::traffic::trajectory::{Carriageway, Lane, NO_LANE, Recording, Track, VehicleClass};
-use proptest::prelude::*;
 
 const LANE_M: f64 = 3.75;
 const LINES_M: [f64; 4] = [1.5 * LANE_M, 0.5 * LANE_M, -0.5 * LANE_M, -1.5 * LANE_M];
@@ -264,10 +264,11 @@ fn the_same_traffic_at_another_rate_gives_the_same_scenarios_up_to_two_samples()
 }
 
 /// A walk in sixty-fourths, which f64 adds and mirrors exactly.
-fn walk(steps: &[i32], stretch: usize) -> Vec<f64> {
+fn walk(dice: &mut Dice, largest: usize) -> Vec<f64> {
+    let stretch = 1 + dice.below(29);
     let mut level = 0;
     let mut walk = Vec::new();
-    for &step in steps {
+    for step in dice.list([1, 39], |dice| dice.below(2 * largest + 1) as i32 - largest as i32) {
         for _ in 0..stretch {
             level += step;
             walk.push(f64::from(level) / 64.0);
@@ -276,52 +277,48 @@ fn walk(steps: &[i32], stretch: usize) -> Vec<f64> {
     walk
 }
 
-proptest! {
-    #[test]
-    fn deceleration_is_acceleration_mirrored(steps in prop::collection::vec(-6..=6i32, 1..40), stretch in 1..30usize) {
-        let v = walk(&steps, stretch);
+#[test]
+fn deceleration_is_acceleration_mirrored() {
+    cases(256, |dice| {
+        let v = walk(dice, 6);
         let mirrored: Vec<f64> = v.iter().map(|v| 50.0 - v).collect();
-        let options = LongitudinalOptions::default();
-        let (here, there) = (longitudinal_events(&v, 25.0, &options), longitudinal_events(&mirrored, 25.0, &options));
-        prop_assert_eq!(here.len(), there.len());
-        for (a, b) in here.iter().zip(&there) {
-            prop_assert_eq!(a.start, b.start);
-            let swapped = match b.activity {
-                Longitudinal::Accelerating => Longitudinal::Decelerating,
-                Longitudinal::Decelerating => Longitudinal::Accelerating,
-                Longitudinal::Cruising => Longitudinal::Cruising,
-            };
-            prop_assert_eq!(a.activity, swapped);
-        }
-    }
+        let events = |v: &[f64]| longitudinal_events(v, 25.0, &LongitudinalOptions::default()).into_iter();
+        let swapped = |activity| match activity {
+            Longitudinal::Accelerating => Longitudinal::Decelerating,
+            Longitudinal::Decelerating => Longitudinal::Accelerating,
+            Longitudinal::Cruising => Longitudinal::Cruising,
+        };
+        let here: Vec<_> = events(&v).map(|of| (of.start, of.activity)).collect();
+        let there: Vec<_> = events(&mirrored).map(|of| (of.start, swapped(of.activity))).collect();
+        assert_eq!(here, there);
+    });
+}
 
-    #[test]
-    fn lane_changes_hold_their_crossing_and_do_not_overlap(
-        steps in prop::collection::vec(-8..=8i32, 1..40),
-        stretch in 1..30usize,
-    ) {
-        let d = walk(&steps, stretch);
+#[test]
+fn lane_changes_hold_their_crossing_and_do_not_overlap() {
+    cases(256, |dice| {
+        let d = walk(dice, 8);
         let lane = Lane { left_m: 1.75, right_m: -1.75 };
         let changes = lane_changes(&d, lane, 25.0, &LateralOptions::default());
         for c in &changes {
-            prop_assert!(c.start < c.crossing && c.crossing < c.end && c.end < d.len());
+            assert!(c.start < c.crossing && c.crossing < c.end && c.end < d.len());
             let inside = |k: usize| d[k] <= 1.75 && d[k] >= -1.75;
             match c.kind {
-                LaneChangeKind::LeftIn => prop_assert!(d[c.crossing - 1] <= -1.75 && d[c.crossing] > -1.75),
-                LaneChangeKind::RightIn => prop_assert!(d[c.crossing - 1] >= 1.75 && d[c.crossing] < 1.75),
-                LaneChangeKind::LeftOut | LaneChangeKind::RightOut => prop_assert!(!inside(c.crossing)),
+                LaneChangeKind::LeftIn => assert!(d[c.crossing - 1] <= -1.75 && d[c.crossing] > -1.75),
+                LaneChangeKind::RightIn => assert!(d[c.crossing - 1] >= 1.75 && d[c.crossing] < 1.75),
+                LaneChangeKind::LeftOut | LaneChangeKind::RightOut => assert!(!inside(c.crossing)),
             }
         }
-        prop_assert!(changes.windows(2).all(|c| c[0].end <= c[1].start));
+        assert!(changes.windows(2).all(|c| c[0].end <= c[1].start));
         let mirrored: Vec<f64> = d.iter().map(|d| -d).collect();
         for lc_end in [LaneChangeEnd::Published, LaneChangeEnd::Observed] {
             let of = |d: &[f64]| lane_changes(d, lane, 25.0, &LateralOptions { lc_end, ..LateralOptions::default() });
             let (here, there) = (of(&d), of(&mirrored));
-            prop_assert_eq!(here.len(), there.len());
+            assert_eq!(here.len(), there.len());
             for (a, b) in here.iter().zip(&there) {
-                prop_assert_eq!((a.start, a.crossing, a.end), (b.start, b.crossing, b.end));
-                prop_assert!(a.kind.is_in() == b.kind.is_in() && a.kind != b.kind);
+                assert_eq!((a.start, a.crossing, a.end), (b.start, b.crossing, b.end));
+                assert!(a.kind.is_in() == b.kind.is_in() && a.kind != b.kind);
             }
         }
-    }
+    });
 }

@@ -1,5 +1,7 @@
 //! Noise decides nothing in silence: rounded positions, rounded speeds and one speed per vehicle are said, and good tracks are not doubted.
 
+use std::sync::LazyLock;
+
 use lanesweep::model::plausibility::Implausible;
 use lanesweep::scenario::Category;
 use lanesweep::traffic::mining::{MiningOptions, count, mine, mine_loaded};
@@ -10,6 +12,11 @@ use crate::common::exid::Plain;
 
 /// Generated traffic, whose positions are the integrals of its speeds.
 fn recording() -> Recording {
+    static MADE: LazyLock<Recording> = LazyLock::new(made);
+    MADE.clone()
+}
+
+fn made() -> Recording {
     let options = GeneratorOptions { recordings: 1, duration_s: 120.0, ..GeneratorOptions::default() };
     let mut recording = generate_one(&options, 0).unwrap();
     for track in &mut recording.tracks {

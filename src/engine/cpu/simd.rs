@@ -1,13 +1,15 @@
 //! The instruction sets for batches of lanes, and their detection. The set is chosen at run time, so that one binary is
 //! fast on every machine.
 //!
+//! Unit tests have AVX2 alone, which halves the time to compile them; `tests/lanes/simd_equals_scalar.rs` runs every set.
+//!
 //! Every set computes the same words. None enables fused multiply-add: lanes round after every operation.
 
 // Calls functions compiled for an instruction set, after detecting that the machine supports it; their loads and
 // stores.
 #![allow(unsafe_code)]
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", not(test)))]
 use super::{
     LANES, ROWS,
     batch_arrays::{Slots, TrackArrays, Words},
@@ -60,7 +62,7 @@ pub(crate) fn burst_for<M: DriverModel<f32>>(instructions: Instructions, rules: 
     match instructions {
         #[cfg(target_arch = "x86_64")]
         Instructions::Avx2 => Some(Burst { run: for_rules!(burst_avx2, M, rules) }),
-        #[cfg(target_arch = "x86_64")]
+        #[cfg(all(target_arch = "x86_64", not(test)))]
         Instructions::Avx512 => Some(Burst { run: for_rules!(burst_avx512, M, rules) }),
         #[cfg(target_arch = "aarch64")]
         Instructions::Neon => Some(Burst { run: for_rules!(burst_neon, M, rules) }),
@@ -78,7 +80,7 @@ fn burst_avx2<M: DriverModel<f32>, const RULES: u32>(
     burst::<M, RULES>(simulation, fleet, pending, take, Window::turn);
 }
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", not(test)))]
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
 fn burst_avx512<M: DriverModel<f32>, const RULES: u32>(
     simulation: &Simulation<f32, M>,
@@ -104,7 +106,7 @@ fn burst_neon<M: DriverModel<f32>, const RULES: u32>(
 }
 
 /// [`take`] in registers: expands consecutive entries of a row into the slots.
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", not(test)))]
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
 #[inline]
 fn take_avx512(rows: &mut [Words], pending: &[[u32; ROOM]], from: usize, slots: Slots) {
@@ -122,7 +124,7 @@ fn take_avx512(rows: &mut [Words], pending: &[[u32; ROOM]], from: usize, slots: 
 }
 
 /// [`Window::turn`] in registers: a square of 16 lanes and 16 steps is transposed by 64 shuffles.
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", not(test)))]
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
 #[inline]
 fn turn_avx512(window: &mut Window, tracks: &TrackArrays<LANES>, steps: &Words, entries: &[f32]) {
@@ -204,7 +206,7 @@ impl Instructions {
             Instructions::Scalar => true,
             #[cfg(target_arch = "x86_64")]
             Instructions::Avx2 => is_x86_feature_detected!("avx2"),
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(target_arch = "x86_64", not(test)))]
             Instructions::Avx512 => {
                 is_x86_feature_detected!("avx512f")
                     && is_x86_feature_detected!("avx512vl")

@@ -1,7 +1,5 @@
 //! Parquet files read and made with the `parquet` crate itself.
 
-#![allow(dead_code)] // every test binary uses its own part
-
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::Path;

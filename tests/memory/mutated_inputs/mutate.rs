@@ -1,22 +1,6 @@
 //! How a valid input is spoilt: one to four changes, drawn from a number.
 
-/// SplitMix64: a reproducible stream of numbers.
-pub struct Dice(pub u64);
-
-impl Dice {
-    pub fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    /// Below `n`; 0 for an `n` of 0.
-    pub fn below(&mut self, n: usize) -> usize {
-        (self.next() % n.max(1) as u64) as usize
-    }
-}
+use crate::common::dice::Dice;
 
 /// Numbers that programs stumble over.
 const NUMBERS: &str = "NaN inf -inf Infinity 1e308 -1e308 1e400 5e-324 1e-300 1e-9 1e-3 -1 0 -0.0 1 \

@@ -1,6 +1,7 @@
 //! Every reader of the library: valid inputs for it, and what a program does with what it reads.
 
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use lanesweep::engine::{Backend, CpuBackend, Headway, LanePlan, SampleTally, Wanted};
 use lanesweep::model::plausibility::Implausible;
@@ -14,8 +15,9 @@ use lanesweep::scenario::{Scenario, read_scenarios};
 use lanesweep::stats::density::{DensityModel, Exposure, read_density};
 use lanesweep::stats::random::Stream;
 use lanesweep::traffic::mining::{MiningOptions, mine, mine_folder};
+use lanesweep::traffic::trajectory::highd::HighdFiles;
 use lanesweep::traffic::trajectory::tracks::{Preset, TrackFile};
-use lanesweep::traffic::trajectory::{InputFile, Inputs, Loaded};
+use lanesweep::traffic::trajectory::{InputFile, Inputs, Loaded, NO_LANE, Recording};
 use lanesweep::{Error, Place, Result};
 
 use super::seeds::Seeds;
@@ -88,7 +90,27 @@ fn recording(which: usize, bytes: &[u8], dir: &Path, seeds: &Seeds) -> Result<()
     for (k, name) in names.into_iter().enumerate() {
         file(if k == which { bytes } else { &seeds.recording[k] }, dir, name);
     }
+    match InputFile::Highd(HighdFiles::named(dir, "01")).read(Implausible::Accepted) {
+        Ok(read) => read.iter().for_each(|loaded| assert_whole(&loaded.recording)),
+        Err(error) => assert!(error.to_string().contains("01_") && error.to_string().len() < 1000, "{error}"),
+    }
     mine_folder(dir, &MiningOptions::default(), Default::default(), || Ok(())).map(drop)
+}
+
+fn assert_whole(recording: &Recording) {
+    assert!(recording.frame_rate_hz > 0.0 && recording.frame_rate_hz.is_finite());
+    assert!(!recording.tracks.is_empty() && recording.tracks.is_sorted_by(|a, b| a.id < b.id));
+    for carriageway in &recording.carriageways {
+        assert!(carriageway.lane_count() > 0 && carriageway.lane_lines_m.is_sorted_by(|a, b| a > b));
+    }
+    for track in &recording.tracks {
+        assert!(track.length_m > 0.0 && track.width_m > 0.0 && !track.is_empty() && track.lane.len() == track.len());
+        let lanes = recording.carriageways[track.carriageway].lane_count();
+        assert!(track.lane.iter().all(|&lane| lane == NO_LANE || usize::from(lane) < lanes));
+        for series in [&track.s_m, &track.d_m, &track.v_s_mps, &track.v_d_mps, &track.a_s_mps2] {
+            assert!(series.len() == track.len() && series.iter().all(|value| value.is_finite()));
+        }
+    }
 }
 
 /// The first lanes of a plan, with one headway.
@@ -166,9 +188,16 @@ fn proposal(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
     Ok(())
 }
 
+/// What is read of a changed file of a run: all of the whole one, which is the first that is read.
+fn is_that_of_the_seed(whole: &OnceLock<String>, read: String) {
+    assert!(*whole.get_or_init(|| read.clone()) == read, "a change is taken for what the run wrote");
+}
+
 fn part(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
     let path = file(bytes, dir, "part.json");
     let read = read_part::<SampleTally>(&path, "00", &PART_UNITS, "make it again")?;
+    static WHOLE: OnceLock<String> = OnceLock::new();
+    is_that_of_the_seed(&WHOLE, format!("{read:?}"));
     for tally in read.segments {
         tally.samples();
         tally.valid();
@@ -185,8 +214,10 @@ fn part(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
 fn plan(bytes: &[u8], dir: &Path, _: &Seeds, heavy: bool) -> Result<()> {
     let path = file(bytes, dir, "plan.json");
     let (head, _, mut records) = read_sealed_line::<StudyHead>("plan", &path, 1 << 26, "make it again")?;
-    let study = head.read(&mut records, &Place::file(&path), |units| 0..units)?;
+    let study = head.clone().read(&mut records, &Place::file(&path), |units| 0..units)?;
     let some = study.window(0..study.outline().unit_count().min(2))?;
+    static WHOLE: OnceLock<String> = OnceLock::new();
+    is_that_of_the_seed(&WHOLE, format!("{head:?} {}", study.window(0..study.outline().unit_count())?.hash()));
     if heavy { run_some(&some, 2) } else { Ok(()) }
 }
 
@@ -195,7 +226,10 @@ fn journal(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {
     let (journal, found) = Journal::<Counted<SampleTally>>::open(&path, "00", PART_UNITS)?;
     let mut ledger = Ledger::new(PART_UNITS, &[]);
     ledger.resume(journal, found)?;
-    ledger.missing(PART_UNITS)?;
+    if ledger.missing(PART_UNITS)?.is_empty() {
+        static WHOLE: OnceLock<String> = OnceLock::new();
+        is_that_of_the_seed(&WHOLE, format!("{:?}", ledger.counts(PART_UNITS)?));
+    }
     Ok(())
 }
 

@@ -3,9 +3,6 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// A bare fence means a command to trycmd; with this language it does not.
-const BARE: &str = "```bare-fence";
-
 /// A Markdown file.
 pub struct Document {
     /// From the crate's root.
@@ -62,48 +59,33 @@ impl Document {
         self.blocks().filter_map(|block| Some((name(&block)?, block.content))).collect()
     }
 
-    /// Lines of prose with their numbers from 1: no blocks, and code spans emptied.
-    pub fn prose(&self) -> Vec<(usize, String)> {
+    /// Lines outside of blocks, with their numbers from 1.
+    pub fn unfenced(&self) -> impl Iterator<Item = (usize, &str)> {
         let mut inside = false;
-        let mut prose = Vec::new();
-        for (at, line) in self.text.lines().enumerate() {
-            if line.trim_start().starts_with("```") {
-                inside = !inside;
-            } else if !inside {
-                let outside_of_spans: Vec<&str> = line.split('`').step_by(2).collect();
-                prose.push((at + 1, outside_of_spans.join("``")));
-            }
-        }
-        prose
-    }
-
-    /// Texts of the headings.
-    pub fn headings(&self) -> Vec<String> {
-        let mut inside = false;
-        let mut headings = Vec::new();
-        for line in self.text.lines() {
-            if line.trim_start().starts_with("```") {
-                inside = !inside;
-            } else if !inside && line.starts_with('#') {
-                headings.push(line.trim_start_matches('#').trim().to_owned());
-            }
-        }
-        headings
+        self.text.lines().enumerate().filter_map(move |(at, line)| {
+            let is_fence = line.trim_start().starts_with("```");
+            inside ^= is_fence;
+            (!inside && !is_fence).then_some((at + 1, line))
+        })
     }
 
     /// Names of the headings in addresses, as mdBook and forges make them.
     pub fn anchors(&self) -> BTreeSet<String> {
-        let name = |heading: &String| -> String {
+        let headings = self.unfenced().filter(|(_, line)| line.starts_with('#'));
+        let name = |(_, line): (usize, &str)| -> String {
+            let heading = line.trim_start_matches('#').trim();
             let kept = heading.chars().filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_'));
             kept.flat_map(char::to_lowercase).map(|c| if c == ' ' { '-' } else { c }).collect()
         };
-        self.headings().iter().map(name).collect()
+        headings.map(name).collect()
     }
 
     /// Inline links and images, addresses in angle brackets, and `src`, `srcset` and `href` of HTML.
     pub fn links(&self) -> Vec<Link> {
         let mut links = Vec::new();
-        for (line, text) in self.prose() {
+        for (line, text) in self.unfenced() {
+            // Code spans emptied.
+            let text = text.split('`').step_by(2).collect::<Vec<_>>().join("``");
             let marks =
                 [("](", ')'), ("<https:", '>'), ("<http:", '>'), ("src=\"", '"'), ("srcset=\"", '"'), ("href=\"", '"')];
             for (open, close) in marks {
@@ -116,58 +98,4 @@ impl Document {
         }
         links
     }
-
-    /// The same as trycmd wants it: bare fences, which it would take for commands, get a language; and every output of a
-    /// command ends as it does on the terminal, which a reader does not have to see: with a newline, and a report of an
-    /// error with an empty line besides.
-    pub fn for_trycmd(&self) -> String {
-        let ending = |output: &[&str]| match output.last() {
-            None | Some(&"...") => "",
-            Some(_) if output.rsplit(|line| line.is_empty()).next().is_some_and(is_report) => "\n\n",
-            Some(_) => "\n",
-        };
-        self.rewritten(|text, fence| if text == "```" { BARE.to_owned() } else { fence.to_owned() }, ending)
-    }
-
-    /// The chapter with its fences as `fence` says (trimmed and as it is) and something after each command's output.
-    fn rewritten(&self, fence: impl Fn(&str, &str) -> String, ending: impl Fn(&[&str]) -> &'static str) -> String {
-        let (mut text, mut output, mut block) = (String::new(), Vec::new(), None);
-        for line in self.text.lines() {
-            let is_fence = line.trim_start().starts_with("```");
-            let is_console = block.is_some_and(|info: &str| info.starts_with("```console"));
-            if is_console && !is_fence && !line.starts_with("$ ") {
-                output.push(line);
-                continue;
-            }
-            while output.last().is_some_and(|line| line.is_empty()) {
-                output.pop();
-            }
-            let printed: Vec<&str> =
-                output.iter().copied().filter(|l| !l.starts_with("> ") && !l.starts_with("? ")).collect();
-            output.iter().for_each(|line| text.push_str(&format!("{line}\n")));
-            text.push_str(ending(&printed));
-            output.clear();
-            if is_fence && block.is_none() {
-                text.push_str(&fence(line.trim(), line));
-            } else {
-                text.push_str(line);
-            }
-            text.push('\n');
-            if is_fence {
-                block = if block.is_none() { Some(line.trim_start()) } else { None };
-            }
-        }
-        text
-    }
-}
-
-/// Lines that end with an error's report.
-fn is_report(lines: &[&str]) -> bool {
-    lines.iter().any(|line| line.starts_with("  × "))
-}
-
-/// Back from [`Document::for_trycmd`].
-pub fn from_trycmd(text: String) -> String {
-    let document = Document { path: String::new(), text };
-    document.rewritten(|text, fence| if text == BARE { "```".to_owned() } else { fence.to_owned() }, |_| "")
 }

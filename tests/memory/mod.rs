@@ -1,16 +1,21 @@
-//! An allocator that counts the live bytes of the thread it is asked from, and refuses what no input may ask for.
+//! What no input may ask for, with an allocator that counts the live bytes of the thread it is asked from.
 
+#![allow(clippy::disallowed_methods, reason = "panics are caught, and a hang ends the process")]
 #![allow(unsafe_code)] // SAFETY: a counting shell around the system's allocator; every call is passed on unchanged.
+
+mod mutated_inputs;
+#[cfg(feature = "parquet")]
+mod table_memory;
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::io::Write;
 
 /// Most that one input may hold at once, bytes.
-pub const MAX_BYTES: isize = 1 << 30;
+const MAX_BYTES: isize = 1 << 30;
 
 /// The input that a thread works on outside of any.
-pub const NO_INPUT: u64 = u64::MAX;
+const NO_INPUT: u64 = u64::MAX;
 
 thread_local! {
     static LIVE: Cell<isize> = const { Cell::new(0) };
@@ -18,7 +23,10 @@ thread_local! {
     static INPUT: Cell<u64> = const { Cell::new(NO_INPUT) };
 }
 
-pub struct Counting;
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+struct Counting;
 
 impl Counting {
     /// Counts a change; false where the input has asked for too much.
@@ -75,6 +83,11 @@ pub fn begin(input: u64) {
     INPUT.set(input);
     LIVE.set(0);
     PEAK.set(0);
+}
+
+/// Whether this thread works on an input.
+pub fn is_counting() -> bool {
+    INPUT.get() != NO_INPUT
 }
 
 /// Ends it: the largest number of bytes held at once.
