@@ -18,8 +18,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     error::add_to(module)?;
     module.add_class::<frame::Frame>()?;
     module.add_class::<limit_state::LimitState>()?;
-    module.add_class::<driver::View>()?;
-    module.add_class::<driver::Vehicle>()?;
     module.add_function(wrap_pyfunction!(verb::run, module)?)?;
     module.add_function(wrap_pyfunction!(verb::main, module)?)?;
     module.add_function(wrap_pyfunction!(verb::described, module)?)?;

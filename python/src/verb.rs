@@ -100,7 +100,7 @@ pub fn watched<T: Send + 'static>(
         Some(cause) => {
             let error = match error {
                 // A single lane, whose run cannot fail by itself.
-                Error::Internal(_) => driver::error_of(py, &cause),
+                Error::Internal(_) => driver::error_of(py, "a driver".to_owned(), &cause),
                 other => other,
             };
             let made = exception(py, &error);
