@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use lanesweep::cli::embedded::{self, Given};
 use lanesweep::{Error, Place, Result};
@@ -19,6 +19,8 @@ use crate::error::exception;
 
 /// How often the calling thread looks for signals.
 const LOOK: Duration = Duration::from_millis(20);
+/// How long a call waits for work that nobody waits for: its present chunk ends sooner, unless a driver blocks.
+const PATIENCE: Duration = Duration::from_secs(5);
 
 /// The turn of this process to work: threads take turns.
 struct Turn;
@@ -31,13 +33,15 @@ static IS_LEFT_ALONE: AtomicBool = AtomicBool::new(false);
 impl Turn {
     /// Waits for the turn. Work that a driver asks for, and work behind one that nobody waits for, is refused.
     fn take(py: Python<'_>) -> PyResult<Turn> {
+        let asked = Instant::now();
         loop {
             let (me, owner) = (std::process::id(), OWNER.load(Ordering::Acquire));
             if owner != me && OWNER.compare_exchange(owner, me, Ordering::AcqRel, Ordering::Relaxed).is_ok() {
                 IS_LEFT_ALONE.store(false, Ordering::Release);
                 return Ok(Turn);
             }
-            if driver::is_calling() || IS_LEFT_ALONE.load(Ordering::Acquire) {
+            let is_left_alone = IS_LEFT_ALONE.load(Ordering::Acquire) && asked.elapsed() > PATIENCE;
+            if driver::is_calling() || is_left_alone {
                 let problem = "another run of lanesweep is in progress here".to_owned();
                 return Err(exception(py, &Error::Busy { place: Box::new(Place::item("this process")), problem }));
             }
@@ -82,6 +86,10 @@ pub fn watched<T: Send + 'static>(
                 return Err(error);
             }
             ended = ended.or(Some(error));
+        }
+        if ended.is_some() {
+            // Work that began after the signal has not seen the request.
+            embedded::cancel();
         }
         match result {
             Ok((result, turn)) => break (result, Some(turn)),
