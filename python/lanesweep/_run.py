@@ -237,9 +237,9 @@ def run(function: str, arguments: Mapping[str, Any]) -> Result:
     shown = ", ".join(f"{name}={_shown(value)}" for name, value in values.items() if name != "out" and value is not False)
     call = os.fsencode(f"lanesweep.{function}({shown})").decode(errors="replace")
     try:
-        code, text, document = _core.run(function, call, {name: _words(value) for name, value in values.items()}, move, on_line)
+        code, text, document, frames = _core.run(function, call, {name: _words(value) for name, value in values.items()}, move, on_line)
     finally:
         close()
     if code == _NOTHING:
         raise _core.InputError("\n".join(messages) or "there is nothing that can be read")
-    return Result(function, code, text, document, messages, None if path is None else Path(path_of(path, "out")), keep)
+    return Result(function, code, text, document, frames, messages, None if path is None else Path(path_of(path, "out")), keep)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import importlib.util
 import json
 import os
 import warnings
@@ -199,17 +201,21 @@ class LimitState(_core.LimitState):
             device=None if device is None else str(device),
         )
         assert isinstance(made, cls)
-        made._arguments = os.fspath(density), model, criterion, thw, profile, backend, device
+        made._arguments = {"density": os.fspath(density), "model": model, "criterion": criterion, "thw": thw}
+        made._arguments |= {"profile": profile, "backend": backend, "device": device}
         made._known_as = known_as
         return made
 
-    _arguments: tuple[Any, ...]
+    _arguments: dict[str, Any]
     _known_as: str
 
+        made._keep = density
     def __reduce__(self) -> tuple[Any, ...]:
-        return _opened, self._arguments
+        return functools.partial(LimitState, **self._arguments), ()
 
     def __call__(self, points: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    #: A copy reads the file again, which goes with what gave it.
+    _keep: Any
         array = self._array(points)
         self._check_driver()
         return super().__call__(array) if len(array) else np.empty(0)
@@ -231,7 +237,7 @@ class LimitState(_core.LimitState):
 
     def _check_driver(self) -> None:
         """Refuse a driver that has changed since: the values of one limit state are those of one driver."""
-        model = self._arguments[1]
+        model = self._arguments["model"]
         if isinstance(model, Driver) and register(model) != self._known_as:
             raise _core.UsageError(f"driver {name_of(model)} has changed since this limit state was made: make another one")
 
@@ -288,16 +294,4 @@ class LimitState(_core.LimitState):
 
 def _has_arrow(table: Any) -> bool:
     """Whether pandas can hand out Arrow data: from 2.2 on, if pyarrow is installed."""
-    if not hasattr(table, "__arrow_c_stream__"):
-        return False
-    try:
-        import pyarrow  # noqa: F401
-    except ImportError:
-        return False
-    return True
-
-
-def _opened(
-    density: str, model: Any, criterion: str, thw: Any, profile: Any, backend: str, device: str | None
-) -> LimitState:
-    return LimitState(density, model=model, criterion=criterion, thw=thw, profile=profile, backend=backend, device=device)
+    return hasattr(table, "__arrow_c_stream__") and importlib.util.find_spec("pyarrow") is not None

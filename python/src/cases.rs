@@ -5,10 +5,12 @@ use std::sync::Arc;
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
-    Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type, UInt32Type, UInt64Type,
+    Decimal128Type, Float16Type, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type,
+    UInt16Type, UInt32Type, UInt64Type,
 };
-use arrow_array::{Array, ArrayRef, BooleanArray, Float64Array, Int64Array, RecordBatch, StringArray};
+use arrow_array::{Array, ArrayRef, Float64Array, Int64Array, RecordBatch, StringArray, UInt64Array};
 use arrow_schema::{DataType, Field, Schema};
+use arrow_select::take::take;
 use lanesweep::cli::embedded;
 use lanesweep::engine::{Headway, OpenBackend};
 use lanesweep::model::driver::ModelId;
@@ -30,13 +32,19 @@ use crate::verb::watched;
 /// Cases that are planned and run together: memory does not grow with the table beyond its result.
 const CASES: usize = 1 << 16;
 
-/// A column of a batch as numbers; null and NaN are missing values.
+/// A column of a batch as numbers; null is a missing value.
 fn numbers(array: &dyn Array) -> Option<Vec<Option<f64>>> {
     macro_rules! of {
         ($($type:ident => $arrow:ident),+) => {
             match array.data_type() {
                 $(DataType::$type => array.as_primitive::<$arrow>().iter().map(|v| v.map(|v| v as f64)).collect(),)+
                 DataType::Null => vec![None; array.len()],
+                DataType::Float16 => array.as_primitive::<Float16Type>().iter().map(|v| v.map(f64::from)).collect(),
+                DataType::Decimal128(_, scale) => {
+                    let unit = 10_f64.powi((*scale).into());
+                    array.as_primitive::<Decimal128Type>().iter().map(|v| v.map(|v| v as f64 / unit)).collect()
+                }
+                DataType::Dictionary(..) => of_names(array, numbers)?,
                 _ => return None,
             }
         };
@@ -54,57 +62,36 @@ fn texts(array: &dyn Array) -> Option<Vec<Option<String>>> {
         DataType::Utf8 => array.as_string::<i32>().iter().map(owned).collect(),
         DataType::LargeUtf8 => array.as_string::<i64>().iter().map(owned).collect(),
         DataType::Utf8View => array.as_string_view().iter().map(owned).collect(),
-        DataType::Dictionary(..) => {
-            let names = array.as_any_dictionary_opt()?;
-            let values = texts(names.values().as_ref())?;
-            let keys = names.normalized_keys();
-            (0..array.len()).map(|row| if array.is_null(row) { None } else { values[keys[row]].clone() }).collect()
-        }
+        DataType::Dictionary(..) => of_names(array, texts)?,
         _ => return None,
     })
+}
+
+/// The values of a dictionary, row by row.
+fn of_names<T: Clone>(array: &dyn Array, of: fn(&dyn Array) -> Option<Vec<Option<T>>>) -> Option<Vec<Option<T>>> {
+    let names = array.as_any_dictionary_opt()?;
+    let values = of(names.values().as_ref())?;
+    if values.is_empty() {
+        return Some(vec![None; array.len()]);
+    }
+    let keys = names.normalized_keys();
+    Some((0..array.len()).map(|row| if array.is_null(row) { None } else { values[keys[row]].clone() }).collect())
 }
 
 fn of_column(name: &str, problem: String, help: &str) -> Error {
     Error::input(Place::default().column(name), problem, help)
 }
 
-/// A column of the given table that the result repeats in every row of its case.
-enum Carried {
-    Numbers(Vec<Option<f64>>),
-    Whole(Vec<Option<i64>>),
-    Flags(Vec<Option<bool>>),
-    Texts(Vec<Option<String>>),
-}
-
-impl Carried {
-    fn of(name: &str, array: &dyn Array) -> Result<Carried> {
-        if array.data_type().is_integer()
-            && let Some(values) = numbers(array)
-        {
-            return Ok(Carried::Whole(values.into_iter().map(|value| value.map(|value| value as i64)).collect()));
-        }
-        if let Some(flags) = array.as_boolean_opt() {
-            return Ok(Carried::Flags(flags.iter().collect()));
-        }
-        let found = numbers(array).map(Carried::Numbers).or_else(|| texts(array).map(Carried::Texts));
-        found.ok_or_else(|| {
-            let problem = format!("holds values of the type {}, which the result cannot repeat", array.data_type());
-            of_column(name, problem, "leave it out, or turn it into texts or numbers")
-        })
+/// A column that the result repeats in every row of its case: numbers and texts as ours, other types as they are.
+fn carried_values(array: &ArrayRef) -> ArrayRef {
+    let values = array.as_ref();
+    if values.data_type().is_integer()
+        && let Some(values) = numbers(values)
+    {
+        return Arc::new(values.into_iter().map(|value| value.map(|value| value as i64)).collect::<Int64Array>());
     }
-
-    /// With every value so many times.
-    fn repeated(&self, times: usize) -> ArrayRef {
-        fn each<T: Clone>(values: &[Option<T>], times: usize) -> impl Iterator<Item = Option<T>> + '_ {
-            values.iter().flat_map(move |value| std::iter::repeat_n(value.clone(), times))
-        }
-        match self {
-            Carried::Numbers(values) => Arc::new(each(values, times).collect::<Float64Array>()),
-            Carried::Whole(values) => Arc::new(each(values, times).collect::<Int64Array>()),
-            Carried::Flags(values) => Arc::new(each(values, times).collect::<BooleanArray>()),
-            Carried::Texts(values) => Arc::new(each(values, times).collect::<StringArray>()),
-        }
-    }
+    let found = numbers(values).map(|values| Arc::new(Float64Array::from(values)) as ArrayRef);
+    found.or_else(|| Some(Arc::new(StringArray::from(texts(values)?)))).unwrap_or_else(|| array.clone())
 }
 
 /// What a table of cases may say elsewhere and all rows share here.
@@ -132,7 +119,7 @@ fn looks_like_a_quantity(name: &str, array: &dyn Array) -> Option<String> {
 }
 
 /// The columns of a batch that say nothing of a case: its id, and others.
-fn carried(batch: &RecordBatch, outcome: &Schema) -> Result<Vec<(String, Carried)>> {
+fn carried(batch: &RecordBatch, outcome: &Schema) -> Result<Vec<(String, ArrayRef)>> {
     let is_own = |name: &str| name == "category" || matches!(NamedNumber::find(name), Err(_) | Ok(Some(_)));
     let columns = batch.schema();
     let columns = columns.fields().iter().zip(batch.columns()).filter(|(field, _)| !is_own(field.name()));
@@ -155,7 +142,7 @@ fn carried(batch: &RecordBatch, outcome: &Schema) -> Result<Vec<(String, Carried
             let help = format!("call it `{near}` if this is meant; a column of your own needs another name");
             return Err(of_column(name, "there is no such column".to_owned(), &help));
         }
-        Ok((name.clone(), Carried::of(name, array.as_ref())?))
+        Ok((name.clone(), carried_values(array)))
     };
     columns.map(of).collect()
 }
@@ -365,7 +352,10 @@ pub fn simulate(
                 let times = batch.num_rows() / piece.num_rows().max(1);
                 let (mut fields, mut columns) = (outcome.fields().to_vec(), batch.columns().to_vec());
                 for (name, values) in of_result {
-                    columns.push(values.repeated(times));
+                    columns.push(
+                        take(&values, &rows, None)
+                            .map_err(|error| of_column(&name, error.to_string(), "leave it out"))?,
+                    );
                     fields.push(Arc::new(Field::new(name, columns[columns.len() - 1].data_type().clone(), true)));
                 }
                 schema = Arc::new(Schema::new_with_metadata(fields, outcome.metadata().clone()));
@@ -376,6 +366,8 @@ pub fn simulate(
                 let rows = counted(missing, "row");
                 format!(
                     "column `speed`: {rows} without a value, the first of them row {first}: the ego's speed is used"
+                let rows: UInt64Array =
+                    (0..piece.num_rows() as u64).flat_map(|row| std::iter::repeat_n(row, times)).collect();
                 )
             }));
             if first_row == 0 {

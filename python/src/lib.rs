@@ -22,7 +22,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(verb::main, module)?)?;
     module.add_function(wrap_pyfunction!(verb::described, module)?)?;
     module.add_function(wrap_pyfunction!(verb::profile, module)?)?;
-    module.add_function(wrap_pyfunction!(frame::frame_of_records, module)?)?;
     module.add_function(wrap_pyfunction!(frame::frame_of_columns, module)?)?;
     module.add_function(wrap_pyfunction!(frame::frame_of_stream, module)?)?;
     module.add_function(wrap_pyfunction!(cases::simulate, module)?)?;

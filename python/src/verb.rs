@@ -16,6 +16,7 @@ use pyo3::types::PyDict;
 
 use crate::driver;
 use crate::error::exception;
+use crate::frame::Frame;
 
 /// How often the calling thread looks for signals.
 const LOOK: Duration = Duration::from_millis(20);
@@ -154,7 +155,7 @@ impl From<Argument> for Given {
     }
 }
 
-/// Runs a verb by the name of its function, with the values of named arguments.
+/// Runs a verb by the name of its function, with the values of named arguments: exit code, text, document and tables.
 #[pyfunction]
 #[pyo3(signature = (function, call, arguments, on_progress=None, on_message=None))]
 pub fn run(
@@ -164,11 +165,14 @@ pub fn run(
     arguments: &Bound<'_, PyDict>,
     on_progress: Option<&Bound<'_, PyAny>>,
     on_message: Option<&Bound<'_, PyAny>>,
-) -> PyResult<(u8, String, String)> {
+) -> PyResult<(u8, String, String, Vec<(String, Frame)>)> {
     let given = arguments.iter().map(|(name, one)| Ok((name.extract()?, one.extract::<Argument>()?.into())));
     let given = given.collect::<PyResult<Vec<(String, Given)>>>()?;
-    let output = watched(py, on_progress, on_message, move || embedded::run(&function, call, given))?;
-    Ok((output.exit.code(), output.text, output.document))
+    watched(py, on_progress, on_message, move || {
+        let output = embedded::run(&function, call, given)?;
+        let tables = output.tables.into_iter().map(|(name, table)| Ok((name, Frame::of(table)?)));
+        Ok((output.exit.code(), output.text, output.document, tables.collect::<Result<_>>()?))
+    })
 }
 
 /// The command line itself, with its own handling of signals. For a process that does nothing else.

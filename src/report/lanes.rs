@@ -5,14 +5,14 @@ use std::path::Path;
 use serde_json::{Map, Value};
 
 use crate::records::{at_contact, smallest_gap_m, time_s};
-use lanesweep_engine::{Chunk, Headway, LanePlan, Outcome};
+use lanesweep_engine::{Chunk, Headway, LanePlan, Outcome, Trace};
 use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::ModelId;
 use lanesweep_run::sampling::{FailingLane, Origin, Sample};
 use lanesweep_run::study::{Study, robust_lanes};
 use lanesweep_stats::density::DensityModel;
 use lanesweep_support::files::make_folder_of;
-use lanesweep_support::table::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter, json_value};
+use lanesweep_support::table::{Cell, Column, ColumnKind, Table, TableFormat, TableMetadata, TableWriter, json_value};
 use lanesweep_support::{Error, Result, option};
 
 /// A table for the lanes of a study; see [`write_study_chunk`]. It is written chunk by chunk, so that memory does not
@@ -135,6 +135,15 @@ pub(super) fn outcome_columns(value: ColumnKind) -> impl Iterator<Item = Column>
 
 pub(super) fn outcome_cells(outcome: &Outcome<f64>, dt_s: f64) -> [Cell<'static>; 18] {
     std::array::from_fn(|at| OUTCOME[at].4(outcome, dt_s))
+}
+
+/// A table with a row per trace, and how each ended, in binary64.
+pub(crate) fn with_outcomes<'t>(mut table: Table, traces: impl IntoIterator<Item = &'t Trace>) -> Table {
+    table.columns.extend(outcome_columns(ColumnKind::Binary64));
+    for (row, trace) in table.rows.iter_mut().zip(traces) {
+        row.extend(outcome_cells(&trace.outcome, trace.dt_s).into_iter());
+    }
+    table
 }
 
 /// How a lane ended, for a JSON document, in binary64.
