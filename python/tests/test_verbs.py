@@ -142,6 +142,18 @@ def test_every_table_of_every_verb_opens_with_one_schema_whatever_its_values(sce
     assert np.isinf(drivers["min_ttc_s"]).any() and np.isinf(lanesweep.trace(**CASE, models="FSM").table("lanes")["max_drac_mps2"]).all()
 
 
+def test_a_row_of_a_frame_is_a_case_of_check_and_trace() -> None:
+    frame = pl.DataFrame({"category": "cut-in", "ego_speed_kmh": [108.0, 60.0], "speed_kmh": 40.0, "gap_m": [25.0, 15.0], "lateral_speed_mps": 1.0, "length": None})
+    expected = [lanesweep.check(**CASE), lanesweep.trace(**CASE, models="FSM")]
+    for row in (frame.row(0, named=True), frame.to_pandas().iloc[0]):
+        found = [lanesweep.check(row), lanesweep.trace(table=row, models="FSM")]
+        for ours, theirs, name in zip(found, expected, ("profiles", "lanes"), strict=True):
+            assert ours.status == theirs.status and ours.table(name)["min_gap_m"].tolist() == theirs.table(name)["min_gap_m"].tolist()
+    for table in (frame, frame.to_pandas()):
+        assert len(lanesweep.check(table.drop("length", axis=1) if table is not frame else table.drop("length")).table("cases")) == 2
+        assert lanesweep.check(frame.drop("length"), row=2).status == "preventable"
+
+
 def test_a_figure_is_saved_as_what_its_name_says(scenarios, tmp_path) -> None:
     pytest.importorskip("matplotlib")
     figure = lanesweep.study(scenarios=scenarios, thw="1.2,0.6", backend="cpu").figure("f1-cut-in")
