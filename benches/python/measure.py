@@ -1,7 +1,7 @@
 """Measures the Python module beside the command line and its peers: `python benches/python/measure.py WHAT`.
 
 WHAT is one of: first (install to first figure; needs a wheel: first WHEEL), cases (a million cases), driver (Reg157 in NumPy on
-the default study), openturns, uqpy (subset simulation on one problem), ray (parts on two and four workers). Prints CSV.
+the default study; drivers of all kinds), openturns, uqpy (subset simulation on one problem), ray (parts on two and four workers). Prints CSV.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import lanesweep
 import numpy as np
@@ -113,34 +114,65 @@ def driver() -> None:
         "gap": rng.uniform(2, 80, count),
         "lateral_speed": rng.uniform(0.3, 2.5, count),
     }
-    row("driver", "lanes", "lane-steps", "seconds", "million lane-steps per second")
-    for name, model in [("built-in", "Reg157"), ("NumPy", Reg157())]:
-        start = time.perf_counter()
+    sys.path.insert(0, str(Path(__file__).parents[2] / "python" / "examples"))
+    from compiled_driver import FastIDM, policy
+    from lanesweep.drivers import IDM
+
+    in_numpy = policy()
+    in_numpy.compiled = None
+    drivers = {
+        "built-in FSM": "FSM", "built-in Reg157": "Reg157", "Reg157 in NumPy": Reg157(), "IDM in NumPy": IDM(), "IDM compiled": FastIDM(),
+        "network in NumPy": in_numpy, "network compiled": policy(),
+    }  # fmt: skip
+    row("driver", "lanes", "lane-steps", "CPU seconds", "million lane-steps per CPU second")
+    few = {name: values[:1000] for name, values in table.items()}
+    for name, model in drivers.items():
+        lanesweep.simulate(few, category="cut-in", models=[model], backend="cpu")
+        start = time.process_time()
         frame = lanesweep.simulate(table, category="cut-in", models=[model], backend="cpu")
-        elapsed = time.perf_counter() - start
+        elapsed = time.process_time() - start
         steps = int(np.round(frame["end_s"] / 0.04 + 1).sum())
         row(name, count, steps, round(elapsed, 2), round(steps / elapsed / 1e6, 2))
-    # A plain loop over the lanes of the same model, without an engine: a cut-in at constant speeds.
-    sample = 300
-    start = time.perf_counter()
-    steps = 0
-    for k in range(sample):
-        v, u, gap, w = (table[key][k] for key in ("ego_speed_mps", "speed_mps", "gap", "lateral_speed"))
-        y, delay = 3.5, 9
-        for _ in range(3000):
-            steps += 1
-            dv, h = v - u, y - 1.9
-            if h < 0 and gap <= 0 or (h < 0 and dv <= 0) or v <= 0:
-                break
-            if h <= 0.5 and dv != 0 and abs(gap) <= abs(dv) * (dv / 12 + 0.45) and gap > -4.3:
-                if delay > 0:
-                    delay -= 1
-                else:
-                    v = max(v - 6 * 0.04, 0.0)
-            gap += (u - v) * 0.04
-            y = max(y - w * 0.04, 0.0)
-    elapsed = time.perf_counter() - start
-    row("plain Python loop", sample, steps, round(elapsed, 2), round(steps / elapsed / 1e6, 2))
+    loop = idm_loop()
+    columns = [values for values in table.values()]
+    loop(*(values[:10] for values in columns))
+    start = time.process_time()
+    steps = loop(*columns)[0]
+    elapsed = time.process_time() - start
+    row("IDM in a loop by numba", count, steps, round(elapsed, 2), round(steps / elapsed / 1e6, 2))
+
+
+def idm_loop() -> Any:
+    """The IDM in cut-ins without an engine: lane after lane, with smallest gap and TTC."""
+    import numba
+
+    @numba.njit(error_model="numpy")
+    def loop(v0s, us, gaps, ws):  # type: ignore[no-untyped-def]
+        steps, collisions, nearest, soonest = 0, 0, np.empty(len(us)), np.empty(len(us))
+        slowing = 0.5 / np.sqrt(1.0 * 2.0)
+        for k in range(len(us)):
+            v, u, gap, y, w, v0 = v0s[k], us[k], gaps[k], 3.5, ws[k], v0s[k]
+            nearest[k], soonest[k] = np.inf, np.inf
+            for _ in range(3000):
+                steps += 1
+                ahead, beside = gap > -4.3, y >= 1.9
+                if not beside and ahead:
+                    nearest[k] = min(nearest[k], gap)
+                    if v > u:
+                        soonest[k] = min(soonest[k], gap / (v - u))
+                if not beside and abs(gap + 2.15) < 2.15:
+                    collisions += 1
+                    break
+                free = 1 - (v / max(v0, 0.1)) ** 4
+                interaction = 0.0
+                if ahead and not beside:
+                    interaction = ((2.0 + max(0.0, v * 1.5 + v * (v - u) * slowing)) / max(gap, 0.1)) ** 2
+                v = max(v + min(max(free - interaction, -8.0), 1.0) * 0.04, 0.0)
+                gap += (u - v) * 0.04
+                y = max(y - w * 0.04, 0.0)
+        return steps, collisions, nearest, soonest
+
+    return loop
 
 
 def problem() -> tuple[lanesweep.LimitState, Path, tempfile.TemporaryDirectory[str]]:
@@ -153,12 +185,12 @@ def problem() -> tuple[lanesweep.LimitState, Path, tempfile.TemporaryDirectory[s
 def ours(path: Path) -> None:
     row("method", "seed", "estimate", "low", "high", "lanes", "seconds")
     truth = lanesweep.sample(path, models="FSM", criterion="collision", thw=1.2, samples=2 * 10**6, backend="cpu")
-    one = truth.table("estimates").rows()[0]
+    one = truth.table("estimates").to_polars().row(0, named=True)
     row("lanesweep crude, the truth", "", one["probability"], one["draws_low"], one["draws_high"], one["runs"], "")
     for seed in range(3):
         start = time.perf_counter()
         found = lanesweep.sample(path, models="FSM", criterion="collision", thw=1.2, estimator="is", seed=seed, backend="cpu")
-        one = found.table("estimates").rows()[0]
+        one = found.table("estimates").to_polars().row(0, named=True)
         seconds = round(time.perf_counter() - start, 2)
         row("lanesweep importance sampling", seed, one["probability"], one["draws_low"], one["draws_high"], one["runs"], seconds)
 

@@ -27,13 +27,11 @@ from ._core import (
     RunStopped,
     SystemRefusal,
     UsageError,
-    Vehicle,
     VerificationError,
-    View,
     __version__,
     profile,
 )
-from ._driver import Driver
+from ._driver import Driver, Vehicle, View
 from ._result import Figure, Result
 from ._simulate import LimitState, simulate
 from ._verbs import *  # noqa: F403

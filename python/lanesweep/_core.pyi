@@ -1,8 +1,8 @@
 """Types of the compiled module."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, final, overload
+from typing import Any, final
 from typing_extensions import disjoint_base
 
 import numpy as np
@@ -20,13 +20,10 @@ __all__ = [
     "RunStopped",
     "SystemRefusal",
     "UsageError",
-    "Vehicle",
     "VerificationError",
-    "View",
     "__version__",
     "described",
     "frame_of_columns",
-    "frame_of_records",
     "frame_of_stream",
     "main",
     "profile",
@@ -75,16 +72,11 @@ class Frame:
     def __arrow_c_stream__(self, requested_schema: Any | None = None) -> Any: ...
     @property
     def shape(self) -> tuple[int, int]: ...
-    def __iter__(self) -> Iterator[dict[str, Any]]: ...
-    @overload
-    def __getitem__(self, name: list[str], /) -> Frame: ...
-    @overload
-    def __getitem__(self, name: str, /) -> Any: ...
+    def __getitem__(self, name: str, /) -> npt.NDArray[Any]: ...
     def __reduce__(self) -> tuple[Any, tuple[bytes]]: ...
+    def to_numpy(self) -> dict[str, npt.NDArray[Any]]: ...
     def to_pandas(self) -> Any: ...
     def to_polars(self) -> Any: ...
-    def to_arrow(self) -> Any: ...
-    def rows(self, n: int | None = None) -> list[dict[str, Any]]: ...
     def _repr_html_(self) -> str: ...
 
 @disjoint_base
@@ -117,82 +109,16 @@ class LimitState:
     ) -> str: ...
     def __call__(self, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]: ...
 
-@final
-class Vehicle:
-    """Another vehicle as the drivers of all running lanes see it: an entry per lane.
-
-    Attributes
-    ----------
-    present : ndarray of bool
-        The vehicle is there for the ego; where it is not, the other entries have no meaning.
-    attended : ndarray of bool
-        It is there, and the attention rule lets the driver react to it.
-    speed, gap, lateral_gap, lateral_speed, half_lengths : ndarray of float32
-        m/s; m, bumper to bumper; m, negative where the vehicles overlap; m/s towards the ego; m.
-    """
-
-    @property
-    def present(self) -> npt.NDArray[np.bool_]: ...
-    @property
-    def attended(self) -> npt.NDArray[np.bool_]: ...
-    @property
-    def speed(self) -> npt.NDArray[np.float32]: ...
-    @property
-    def gap(self) -> npt.NDArray[np.float32]: ...
-    @property
-    def lateral_gap(self) -> npt.NDArray[np.float32]: ...
-    @property
-    def lateral_speed(self) -> npt.NDArray[np.float32]: ...
-    @property
-    def half_lengths(self) -> npt.NDArray[np.float32]: ...
-
-@final
-class View:
-    """All running lanes at one step: an entry per lane.
-
-    Attributes
-    ----------
-    step : int
-        Index of the step.
-    time_s : float
-        Time since the start, s.
-    lane : ndarray of int64
-        Position of each lane in its batch, ascending: the index of its entry in arrays of states.
-    ego_speed, ego_acceleration : ndarray of float32
-        m/s; m/s² over the last step, 0 at the start.
-    other : Vehicle
-        The principal vehicle: it cuts in, cuts out, or leads.
-    ahead : Vehicle
-        In a cut-out, the vehicle ahead of the one that cuts out; elsewhere it is not present.
-    """
-
-    @property
-    def step(self) -> int: ...
-    @property
-    def time_s(self) -> float: ...
-    @property
-    def lane(self) -> npt.NDArray[np.int64]: ...
-    @property
-    def ego_speed(self) -> npt.NDArray[np.float32]: ...
-    @property
-    def ego_acceleration(self) -> npt.NDArray[np.float32]: ...
-    @property
-    def other(self) -> Vehicle: ...
-    @property
-    def ahead(self) -> Vehicle: ...
-    def __len__(self) -> int: ...
-
 def run(
     function: str,
     call: str,
     arguments: dict[str, bool | list[str | Path]],
     on_progress: Callable[[str, int, int], None] | None = None,
     on_message: Callable[[str, str], None] | None = None,
-) -> tuple[int, str, str]: ...
+) -> tuple[int, str, str, list[tuple[str, Frame]]]: ...
 def main(words: Sequence[str]) -> int: ...
 def described(function: str) -> dict[str, Any]: ...
 def profile(name: str) -> dict[str, Any]: ...
-def frame_of_records(json: str, order: Sequence[str] = ...) -> Frame: ...
 def frame_of_columns(columns: dict[str, Any]) -> Frame: ...
 def frame_of_stream(bytes: bytes) -> Frame: ...
 def simulate(
@@ -205,7 +131,15 @@ def simulate(
     dt: float | None,
     backend: str,
     device: str | None,
+    reference: bool,
     accept_implausible: bool,
     on_message: Callable[[str, str], None] | None = None,
 ) -> tuple[Frame, list[str]]: ...
-def register(name: str, fingerprint: str, driver: Any, may_accelerate: bool, attention: str) -> None: ...
+def register(
+    name: str,
+    fingerprint: str,
+    driver: Any,
+    may_accelerate: bool,
+    attention: str,
+    compiled: tuple[int, list[float], int, bool] | None,
+) -> None: ...

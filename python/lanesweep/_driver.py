@@ -1,30 +1,91 @@
-"""Drivers written in Python."""
+"""Drivers of one's own: in Python, or compiled."""
 
 from __future__ import annotations
 
-import abc
+import ctypes
+import functools
 import re
 import threading
+import types
+from _ctypes import CFuncPtr
 from collections.abc import Iterable
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._core import View
 from ._identity import Unreadable, digest
 
+#: The signature of a compiled driver, as `numba.cfunc` takes it; see `Driver.compiled`.
+SIGNATURE = f"void(int64, int64, int64, float64, {', '.join(['CPointer(float32)'] * 4)})"
 
-class Driver(abc.ABC):
+
+class Vehicle:
+    """Another vehicle as the drivers of all running lanes see it: an entry per lane.
+
+    Attributes
+    ----------
+    present : ndarray of bool
+        The vehicle is there for the ego; where it is not, the other entries have no meaning.
+    attended : ndarray of bool
+        It is there, and the attention rule lets the driver react to it.
+    speed, gap, lateral_gap, lateral_speed, half_lengths : ndarray of float32
+        m/s; m, bumper to bumper; m, negative where the vehicles overlap; m/s towards the ego; m.
+    """
+
+    def __init__(self, rows: npt.NDArray[np.float32]) -> None:
+        present, attended, self.speed, self.gap, self.lateral_gap, self.lateral_speed, self.half_lengths = rows
+        self.present: npt.NDArray[np.bool_] = present != 0
+        self.attended: npt.NDArray[np.bool_] = attended != 0
+
+
+class View:
+    """All running lanes at one step: an entry per lane.
+
+    Attributes
+    ----------
+    step : int
+        Index of the step.
+    time_s : float
+        Time since the start, s.
+    lane : ndarray of int64
+        Position of each lane in its batch: the index of its entry in arrays of states. In no order.
+    ego_speed, ego_acceleration : ndarray of float32
+        m/s; m/s² over the last step, 0 at the start.
+    other : Vehicle
+        The principal vehicle: it cuts in, cuts out, or leads.
+    ahead : Vehicle
+        In a cut-out, the vehicle ahead of the one that cuts out; elsewhere it is not present.
+    rows : ndarray of float32, shape (16, len(view))
+        All of this: the rows that a compiled driver gets.
+    """
+
+    def __init__(self, step: int, time_s: float, lane: npt.NDArray[np.int64], rows: npt.NDArray[np.float32]) -> None:
+        self.step, self.time_s, self.lane, self.rows = step, time_s, lane, rows
+        self.ego_speed, self.ego_acceleration = rows[:2]
+
+    @functools.cached_property
+    def other(self) -> Vehicle:
+        return Vehicle(self.rows[2:9])
+
+    @functools.cached_property
+    def ahead(self) -> Vehicle:
+        return Vehicle(self.rows[9:])
+
+    def __len__(self) -> int:
+        return len(self.lane)
+
+
+class Driver:
     """A driver of the ego vehicle, vectorised over lanes.
 
-    Subclass it, implement `acceleration`, and give an instance wherever a driver model is expected: ``models=["FSM",
-    MyDriver()]``. The engine steps the lanes; frame, criteria and order of a step are those of the built-in drivers. Lanes
-    are in binary32 on the CPU.
+    Subclass it, implement `acceleration`, `compiled` or both, and give an instance wherever a driver model is expected:
+    ``models=["FSM", MyDriver()]``. The engine steps the lanes; frame, criteria and order of a step are those of the
+    built-in drivers. Lanes are in binary32 on the CPU.
 
-    A driver is its code, its present values and what the code reads: change a value, and it is another driver in the next run. What
-    a run changes belongs into what `start` returns.
+    A driver is its code, its present values and what the code reads: change a value, and it is another driver in the next
+    run. What a run changes belongs into what `start` returns.
 
     Attributes
     ----------
@@ -36,11 +97,29 @@ class Driver(abc.ABC):
     attention : str
         Built-in model whose attention rule applies: `Vehicle.attended` says when its driver may react to a vehicle. FSM
         attends always.
+    compiled : function or int, optional
+        The driver as machine code, which is called in threads and without Python: a Python function, which numba compiles,
+        a function of ctypes, or an address. In C::
+
+            void compiled(int64_t lanes, int64_t stride, int64_t step, double dt_s,
+                          const float *view, float *state, const float *parameters, float *acceleration);
+
+        Row r of lane i is ``view[r * stride + i]``; `lanesweep.drivers` names the rows. `state` has `state_rows` such rows
+        of the driver's own, 0 at the start. It writes `lanes` accelerations, m/s². Where `acceleration` is implemented too,
+        both are compared once, over the first lanes; a difference of more than 0.001 in one lane of a hundred is an error.
+        An address says nothing of its code: give such a driver a value that changes with it.
+    parameters : array_like of float
+        Numbers for `compiled`, in binary32.
+    state_rows : int
+        Rows of the state of `compiled`.
     """
 
     name: str = ""
-    may_accelerate: ClassVar[bool] = True
-    attention: ClassVar[str] = "FSM"
+    may_accelerate: bool = True
+    attention: str = "FSM"
+    compiled: Any = None
+    parameters: npt.ArrayLike = ()
+    state_rows: int = 0
 
     def start(self, lanes: int, dt_s: float) -> Any:
         """Start a batch of lanes.
@@ -60,7 +139,6 @@ class Driver(abc.ABC):
         """
         return None
 
-    @abc.abstractmethod
     def acceleration(self, view: View, state: Any) -> npt.ArrayLike:
         """Decide for all running lanes at one step.
 
@@ -76,6 +154,52 @@ class Driver(abc.ABC):
         array_like of float, shape (len(view),)
             Acceleration until the next step, m/s²; at most 100 in magnitude. The speed stops at 0.
         """
+        raise NotImplementedError
+
+
+def decided(driver: Driver, state: Any, step: int, time_s: float, lane: npt.NDArray[np.int64], rows: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """Ask a driver; `rows` are one after the other, with a stride of their own."""
+    count = len(lane)
+    found = np.asarray(driver.acceleration(View(step, time_s, lane, rows.reshape(16, -1)[:, :count]), state), dtype=np.float32)
+    if found.ndim > 1:
+        raise _core.UsageError(
+            f"`acceleration` returned an array of {found.ndim} dimensions and the shape {found.shape}; expected one number per lane: ({count},)"
+        )
+    if found.ndim == 1 and len(found) != count:
+        raise _core.UsageError(f"`acceleration` returned {len(found)} numbers for {count} lanes")
+    return np.ascontiguousarray(np.broadcast_to(found, count))
+
+
+#: Functions that numba compiled, by their digest.
+_compiled: dict[str, Any] = {}
+
+
+def _machine_code(driver: Driver) -> Any:
+    """What `compiled` is: a function of Python, numba or ctypes, or an address."""
+    found = driver.compiled
+    # A method is the function in the class.
+    return getattr(found, "__func__", found)
+
+
+def _address(driver: Driver) -> int:
+    found, of = _machine_code(driver), f"driver {name_of(driver)}: `compiled`"
+    if isinstance(found, types.FunctionType):
+        try:
+            import numba
+        except ImportError:
+            raise _core.UsageError(
+                f"{of} is a function in Python, which numba compiles\n  help: pip install numba, or give a C function"
+            ) from None
+        key = digest(found)
+        if key not in _compiled:
+            _compiled[key] = numba.cfunc(SIGNATURE)(found)
+        found = _compiled[key]
+    if isinstance(found, CFuncPtr):
+        found = ctypes.cast(found, ctypes.c_void_p).value
+    address = getattr(found, "address", found)
+    if not isinstance(address, int) or isinstance(address, bool) or address <= 0:
+        raise TypeError(f"{of} is {found!r:.80}; give a function of Python, numba or ctypes, or an address")
+    return address
 
 
 #: The driver that the engine last got for a name and fingerprint.
@@ -88,7 +212,10 @@ _lock = threading.Lock()
 def fingerprint(driver: Driver) -> str:
     """Distinguish drivers of one name: by their code, their present values, and what the code reads."""
     try:
-        return digest(driver, driver.name, driver.may_accelerate, driver.attention)
+        code = _machine_code(driver)
+        # An address is another one in every process.
+        code = None if isinstance(code, int) else getattr(code, "__wrapped__", code)
+        return digest(driver, driver.name, driver.may_accelerate, driver.attention, code, driver.parameters, driver.state_rows)
     except Unreadable as error:
         raise _core.UsageError(
             f"driver {name_of(driver)}: {error}\n  help: a driver is known by its code and its values: make this in `start`, "
@@ -116,7 +243,13 @@ def register(driver: Driver, known_as: str | None = None) -> str:
     with _lock:
         # Another object with these values is another driver: it may change later.
         if _registered.get(identity) is not driver:
-            _core.register(name, identity.rpartition("@")[2], driver, bool(driver.may_accelerate), attention)
+            compiled, in_python = None, type(driver).acceleration is not Driver.acceleration
+            if driver.compiled is not None:
+                numbers = np.asarray(driver.parameters, dtype=np.float32).ravel().tolist()
+                compiled = _address(driver), numbers, int(driver.state_rows), in_python
+            elif not in_python:
+                raise TypeError(f"driver {name}: it has neither `acceleration` nor `compiled`")
+            _core.register(name, identity.rpartition("@")[2], driver, bool(driver.may_accelerate), attention, compiled)
             _registered[identity] = driver
         _named[name.casefold()] = driver
     return identity

@@ -7,6 +7,7 @@ defaults, recursively. Installed packages count by name and version. What code f
 from __future__ import annotations
 
 import copyreg
+import ctypes
 import dis
 import enum
 import functools
@@ -16,7 +17,9 @@ import importlib.metadata
 import sys
 import sysconfig
 import types
+from _ctypes import CFuncPtr
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -128,6 +131,13 @@ class _Walk:
         elif isinstance(value, enum.Enum):
             self.say(value.name)
             self.add(type(value), where)
+        elif isinstance(value, CFuncPtr):
+            # A function of a library, or one of Python for C.
+            self.say("function of C", getattr(value, "__name__", None))
+            self.add(list((value._objects or {}).values()), where)
+        elif isinstance(value, ctypes.CDLL):
+            file = Path(value._name or "")
+            self.say("library", hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else value._name)
         elif callable(inner := getattr(value, "__wrapped__", None)):
             # A jitted or cached function.
             self.say("wrapper", type(value).__qualname__)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import html
 import json
 import os
@@ -10,11 +9,11 @@ import re
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, TypeGuard
+from typing import Any
 
 import numpy as np
 
-from ._core import Frame, frame_of_columns, frame_of_records
+from ._core import Frame
 
 #: What the exit code of a result means; other codes are exceptions.
 STATUS = {
@@ -28,15 +27,13 @@ STATUS = {
 #: The word of a function whose result answers a question.
 _ANSWERS = {"check": "preventable"}
 
-#: Columns whose values are names, even where all of them look like numbers.
-_NAMES = {"id", "scenario", "variant", "headway", "category", "model", "criterion", "lane", "claim"}
-
 
 class Figure:
-    """A figure in SVG; notebooks show it."""
+    """A figure in SVG; notebooks show it. It has a `path`, and its `numbers` as a table if it has any."""
 
-    def __init__(self, path: Path, keep: Any = None) -> None:
+    def __init__(self, path: Path, numbers: Frame | None = None, keep: Any = None) -> None:
         self.path = path
+        self.numbers = numbers
         self._keep = keep
 
     @property
@@ -44,9 +41,12 @@ class Figure:
         return self.path.read_text(encoding="utf-8")
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the figure to a file."""
+        """Write the figure to a file: SVG, or what Matplotlib makes of the numbers, by the ending of the name."""
         target = Path(path)
-        target.write_text(self.svg, encoding="utf-8")
+        if target.suffix.lower() == ".svg":
+            target.write_text(self.svg, encoding="utf-8")
+        else:
+            self.plot().savefig(target)
         return target
 
     def plot(self) -> Any:
@@ -59,11 +59,10 @@ class Figure:
         """
         import matplotlib.pyplot as plt
 
-        numbers = self.path.parent.parent / "tables" / f"{self.path.stem}.csv"
-        if not numbers.is_file():
+        if self.numbers is None:
             raise ValueError(f"{self.path.name} has no numbers beside it; `svg` is the figure")
-        header, *rows = _rows(numbers)
-        records = [dict(zip(header, row, strict=True)) for row in rows]
+        table = self.numbers.to_numpy()
+        records = [dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=True)]
         panels = list(dict.fromkeys(record["panel"] for record in records))
         columns = min(len(panels), 3)
         figure, axes = plt.subplots(
@@ -77,10 +76,10 @@ class Figure:
             for name in dict.fromkeys(record["series"] for record in own):
                 series = [record for record in own if record["series"] == name]
                 # Rows with a name have their place on the other axis.
-                x = [float(record["x"]) for record in series]
-                y = [float(record["y"] or -names.index(record["row"])) for record in series]
+                x = [record["x"] for record in series]
+                y = [-names.index(record["row"]) if np.isnan(record["y"]) else record["y"] for record in series]
                 axis.errorbar(x, y, _bars(series, "y", y), _bars(series, "x", x), fmt="o" if names else "o-", markersize=4, label=name)
-            if names and not own[0]["y"]:
+            if names and np.isnan(own[0]["y"]):
                 axis.set_yticks([-at for at in range(len(names))], names)
             axis.set(title=panel, xlabel=own[0]["x_quantity"], ylabel=own[0]["y_quantity"])
         axes.flat[0].legend(fontsize="small")
@@ -97,12 +96,20 @@ class Figure:
         return f"Figure({self.path.name!r})"
 
 
-def _bars(rows: list[dict[str, str]], axis: str, at: list[float]) -> Any:
+def _bars(rows: list[dict[str, Any]], axis: str, at: list[float]) -> Any:
     """Distances to the ends of intervals, as Matplotlib takes them; none without any."""
-    if not any(row[f"{axis}_low"] for row in rows):
-        return None
-    ends = [[float(row[f"{axis}_{end}"] or value) for row, value in zip(rows, at, strict=True)] for end in ("low", "high")]
-    return np.abs(np.array(ends) - np.array(at))
+    ends = np.array([[row[f"{axis}_{end}"] for row in rows] for end in ("low", "high")])
+    return None if np.isnan(ends[0]).all() else np.abs(np.where(np.isnan(ends), at, ends) - np.array(at))
+
+
+class _Kept(type(Path())):  # type: ignore[misc]
+    """A path whose temporary folder stays with it."""
+
+    @classmethod
+    def of(cls, path: Path, keep: Any) -> Path:
+        made = cls(path)
+        made.keep = keep
+        return made
 
 
 class Result:
@@ -126,7 +133,7 @@ class Result:
     """
 
     def __init__(
-        self, verb: str, code: int, text: str, document: str, messages: list[str], path: Path | None, keep: Any
+        self, verb: str, code: int, text: str, document: str, tables: list[tuple[str, Frame]], messages: list[str], path: Path | None, keep: Any
     ) -> None:
         self.verb = verb
         self.status = _ANSWERS.get(verb, "ok") if code == 0 else STATUS.get(code, str(code))
@@ -135,6 +142,7 @@ class Result:
         self.path = path
         self._keep = keep
         self._json = document
+        self._tables = dict(tables)
         self._document: dict[str, Any] | None = None
 
     @property
@@ -154,29 +162,18 @@ class Result:
         if self.verb != "fit" or self.path is None:
             return {}
         found = self._files("*.json") if self.path.is_dir() else iter([self.path])
-        return {path.stem: path for path in sorted(found) if not path.name.startswith("lanesweep-")}
+        return {path.stem: _Kept.of(path, self._keep) for path in sorted(found) if not path.name.startswith("lanesweep-")}
 
     @property
     def tables(self) -> list[str]:
-        """Names of the tables: of the document, and of the folder's CSV files."""
-        in_document = [key for key, value in self.document.items() if _is_table(value)]
-        in_folder = sorted(path.stem for path in self._files("*.csv"))
-        return in_document + [name for name in in_folder if name not in in_document]
+        """Names of the tables."""
+        return list(self._tables)
 
     def table(self, name: str) -> Frame:
-        """Return a table as a frame."""
-        value = self.document.get(name)
-        path = next((path for path in self._files("*.csv") if path.stem == name), None)
-        has_file = path is not None
-        # Types are those of the document, unless its rows hold more than values.
-        if _is_table(value) and not (has_file and any(isinstance(one, dict) for row in value for one in row.values())):
-            header, *rows = _rows(path) if path is not None and has_file else [[]]
-            # What the file says of the data as a whole: that they are synthetic.
-            said = {name: rows[0][at] for at, name in enumerate(header) if name == "data" and rows and name not in value[0]}
-            return frame_of_records(_json([row | said for row in value]), header)
-        if path is None or not has_file:
-            raise KeyError(f"there is no table `{name}`; there are {', '.join(self.tables)}")
-        return _read_csv(path)
+        """Return a table; its columns, types and units are the same whatever its values."""
+        if name not in self._tables:
+            raise KeyError(f"there is no table `{name}`; there are {', '.join(self.tables) or 'none'}")
+        return self._tables[name]
 
     @property
     def figures(self) -> list[str]:
@@ -188,7 +185,7 @@ class Result:
         path = next((path for path in self._files("*.svg") if path.stem == name), None)
         if path is None:
             raise KeyError(f"there is no figure `{name}`; there are {', '.join(self.figures)}")
-        return Figure(path, self._keep)
+        return Figure(path, self._tables.get(name), self._keep)
 
     def save(self, folder: str | os.PathLike[str]) -> Path:
         """Copy the files into a new folder."""
@@ -232,55 +229,10 @@ class Result:
         return f"<pre>{html.escape(self.text)}</pre>"
 
 
-def _is_table(value: Any) -> TypeGuard[list[dict[str, Any]]]:
-    return isinstance(value, list) and bool(value) and all(isinstance(row, dict) for row in value)
-
-
 def _with_infinity(record: dict[str, Any]) -> dict[str, Any]:
     """Read infinite numbers, which JSON has not and the program writes as texts."""
     infinite = {"Infinity": float("inf"), "-Infinity": float("-inf")}
     return {key: infinite.get(value, value) if isinstance(value, str) else value for key, value in record.items()}
-
-
-def _json(records: list[dict[str, Any]]) -> str:
-    """Write records as the program does."""
-    infinite = {float("inf"): "Infinity", float("-inf"): "-Infinity"}
-
-    def finite(value: Any) -> Any:
-        return infinite.get(value, value) if isinstance(value, float) else value
-
-    return json.dumps([{key: finite(value) for key, value in record.items()} for record in records])
-
-
-def _rows(path: str | os.PathLike[str]) -> list[list[str]]:
-    """Header and rows of a CSV file."""
-    with open(path, encoding="utf-8", newline="") as file:
-        return list(csv.reader(file))
-
-
-def _typed(values: list[str]) -> list[Any]:
-    """Read a column of texts as whole numbers or numbers, if all of them are. Empty or NaN is no value."""
-    for read in (int, float):
-        try:
-            return [None if value in ("", "NaN") else read(value) for value in values]
-        except ValueError:
-            continue
-    return [value or None for value in values]
-
-
-def _read_csv(path: str | os.PathLike[str]) -> Frame:
-    """Read a CSV table that lanesweep wrote."""
-    header, *rows = _rows(path)
-    columns = {}
-    for at, name in enumerate(header):
-        texts = [row[at] for row in rows]
-        # Our files protect texts that a spreadsheet would take for a formula.
-        texts = [text[1:] if text[:1] == "'" and text[1:2] in "'=+-@\t\r" else text for text in texts]
-        columns[name] = [text or None for text in texts] if name in _NAMES else _typed(texts)
-    records = [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
-    if not records:
-        return frame_of_columns({name: [] if name in _NAMES else np.empty(0) for name in header})
-    return frame_of_records(_json(records), header)
 
 
 def temporary() -> tempfile.TemporaryDirectory[str]:

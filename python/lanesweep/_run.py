@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import importlib
 import json
 import logging
@@ -152,6 +153,14 @@ def table_file(table: Any, path: Path) -> Path:
     return path.with_suffix(".parquet")
 
 
+def row_file(row: Any, path: Path) -> Path:
+    """Write a row, a dictionary or a Series of pandas, into a table of its own."""
+    given = {name: value for name, value in row.items() if value is not None and type(value).__name__ != "NAType" and value == value}
+    with open(path, "w", encoding="utf-8", newline="") as file:
+        csv.writer(file).writerows([given.keys(), given.values()])
+    return path
+
+
 def _texts(value: Any) -> Iterator[str]:
     """The texts in a value."""
     if isinstance(value, str):
@@ -206,9 +215,15 @@ def run(function: str, arguments: Mapping[str, Any]) -> Result:
     if isinstance(plan, Result) and plan.folder is not None and (plan.folder / "plan.json").is_file():
         given["plan"] = plan.folder / "plan.json"
     keep = None
-    if is_table(given.get("scenarios")):
-        keep = temporary()
-        given["scenarios"] = table_file(given["scenarios"], Path(keep.name) / "scenarios")
+    for name in ("scenarios", "file", "table"):
+        value = given.get(name)
+        is_row = isinstance(value, Mapping) or getattr(value, "ndim", 2) == 1
+        if is_row and name != "scenarios":
+            keep = keep or temporary()
+            given[name], given["row"] = row_file(value, Path(keep.name) / f"{name}.csv"), given.get("row") or 1
+        elif is_table(value):
+            keep = keep or temporary()
+            given[name] = table_file(value, Path(keep.name) / name)
     external = given.get("external")
     tables = external if isinstance(external, Mapping) else {"external": external} if is_table(external) else {}
     if tables:
@@ -237,9 +252,9 @@ def run(function: str, arguments: Mapping[str, Any]) -> Result:
     shown = ", ".join(f"{name}={_shown(value)}" for name, value in values.items() if name != "out" and value is not False)
     call = os.fsencode(f"lanesweep.{function}({shown})").decode(errors="replace")
     try:
-        code, text, document = _core.run(function, call, {name: _words(value) for name, value in values.items()}, move, on_line)
+        code, text, document, frames = _core.run(function, call, {name: _words(value) for name, value in values.items()}, move, on_line)
     finally:
         close()
     if code == _NOTHING:
         raise _core.InputError("\n".join(messages) or "there is nothing that can be read")
-    return Result(function, code, text, document, messages, None if path is None else Path(path_of(path, "out")), keep)
+    return Result(function, code, text, document, frames, messages, None if path is None else Path(path_of(path, "out")), keep)

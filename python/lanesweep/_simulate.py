@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import importlib.util
 import json
 import os
 import warnings
@@ -64,6 +66,7 @@ def simulate(
     dt: float | None = None,
     backend: str = "auto",
     device: str | int | None = None,
+    reference: bool = False,
     accept_implausible: bool = False,
 ) -> Frame:
     """Run concrete cases against driver models.
@@ -90,6 +93,8 @@ def simulate(
         Time step, s; by default the profile's.
     backend, device : str
         ``"auto"``, ``"cpu"`` or ``"gpu"``, and the name of a device. Results do not depend on them.
+    reference : bool
+        Run in binary64, as `check` and `trace` do, on the CPU and several times slower.
     accept_implausible : bool
         Use physically impossible values with a warning.
 
@@ -97,7 +102,8 @@ def simulate(
     -------
     Frame
         A row per case, headway and model, the last varying fastest: verdicts, minima and maxima, times in s, speeds in m/s. Lanes
-        are in binary32, as in a study; `trace` is in binary64.
+        are in binary32, as in a study. Where `robust` is false, binary64 (`check`, `trace`, ``reference=True``) gives another
+        verdict: the case is within rounding of a limit.
 
     Raises
     ------
@@ -128,6 +134,7 @@ def simulate(
             dt=dt,
             backend=backend,
             device=None if device is None else str(device),
+            reference=reference,
             accept_implausible=accept_implausible,
             on_message=on_message,
         )
@@ -199,15 +206,19 @@ class LimitState(_core.LimitState):
             device=None if device is None else str(device),
         )
         assert isinstance(made, cls)
-        made._arguments = os.fspath(density), model, criterion, thw, profile, backend, device
+        made._arguments = {"density": os.fspath(density), "model": model, "criterion": criterion, "thw": thw}
+        made._arguments |= {"profile": profile, "backend": backend, "device": device}
         made._known_as = known_as
+        made._keep = density
         return made
 
-    _arguments: tuple[Any, ...]
+    _arguments: dict[str, Any]
     _known_as: str
+    #: A copy reads the file again, which goes with what gave it.
+    _keep: Any
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _opened, self._arguments
+        return functools.partial(LimitState, **self._arguments), ()
 
     def __call__(self, points: npt.ArrayLike) -> npt.NDArray[np.float64]:
         array = self._array(points)
@@ -231,7 +242,7 @@ class LimitState(_core.LimitState):
 
     def _check_driver(self) -> None:
         """Refuse a driver that has changed since: the values of one limit state are those of one driver."""
-        model = self._arguments[1]
+        model = self._arguments["model"]
         if isinstance(model, Driver) and register(model) != self._known_as:
             raise _core.UsageError(f"driver {name_of(model)} has changed since this limit state was made: make another one")
 
@@ -288,16 +299,4 @@ class LimitState(_core.LimitState):
 
 def _has_arrow(table: Any) -> bool:
     """Whether pandas can hand out Arrow data: from 2.2 on, if pyarrow is installed."""
-    if not hasattr(table, "__arrow_c_stream__"):
-        return False
-    try:
-        import pyarrow  # noqa: F401
-    except ImportError:
-        return False
-    return True
-
-
-def _opened(
-    density: str, model: Any, criterion: str, thw: Any, profile: Any, backend: str, device: str | None
-) -> LimitState:
-    return LimitState(density, model=model, criterion=criterion, thw=thw, profile=profile, backend=backend, device=device)
+    return hasattr(table, "__arrow_c_stream__") and importlib.util.find_spec("pyarrow") is not None

@@ -473,7 +473,7 @@ def map(
 
 
 def check(
-    file: Path | None = None,
+    file: Path | Table | Mapping[str, Any] | None = None,
     *,
     row: Int | None = None,
     scenario: str | None = None,
@@ -521,7 +521,7 @@ def check(
 
     Parameters
     ----------
-    file : Path
+    file : Path | Table | Mapping[str, Any]
         TOML file, table (.csv, .parquet) or scenario file (.jsonl) with the case.
     row : Int
         Row of a table, from 1 after the header, by default all rows.
@@ -599,7 +599,7 @@ def check(
 def trace(
     *,
     case_file: Path | None = None,
-    table: Path | None = None,
+    table: Path | Table | Mapping[str, Any] | None = None,
     row: Int | None = None,
     scenarios: Path | Table | None = None,
     from_: Path | None = None,
@@ -645,7 +645,7 @@ def trace(
     ----------
     case_file : Path
         TOML file with the case.
-    table : Path
+    table : Path | Table | Mapping[str, Any]
         Table (.csv, .parquet) with one case per row.
     row : Int
         Row of the table, from 1 after the header; needed if it has several.

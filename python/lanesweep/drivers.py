@@ -1,4 +1,8 @@
-"""Drivers in NumPy: examples to start from."""
+"""Drivers in NumPy, to start from; and what compiled ones need.
+
+Rows that a compiled driver sees: `EGO_SPEED`, `EGO_ACCELERATION`, and of each vehicle ``OTHER + r`` and ``AHEAD + r``, r one
+of `PRESENT`, `ATTENDED` (1 or 0), `SPEED`, `GAP`, `LATERAL_GAP`, `LATERAL_SPEED`, `HALF_LENGTHS`.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +11,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ._core import View, profile
-from ._driver import Driver
+from ._core import profile
+from ._driver import SIGNATURE as SIGNATURE
+from ._driver import Driver, View
+
+EGO_SPEED, EGO_ACCELERATION, OTHER, AHEAD = 0, 1, 2, 9
+PRESENT, ATTENDED, SPEED, GAP, LATERAL_GAP, LATERAL_SPEED, HALF_LENGTHS = range(7)
 
 f32 = np.float32
 

@@ -5,10 +5,12 @@ use std::sync::Arc;
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
-    Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type, UInt32Type, UInt64Type,
+    Decimal128Type, Float16Type, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type,
+    UInt16Type, UInt32Type, UInt64Type,
 };
-use arrow_array::{Array, ArrayRef, BooleanArray, Float64Array, Int64Array, RecordBatch, StringArray};
+use arrow_array::{Array, ArrayRef, Float64Array, Int64Array, RecordBatch, StringArray, UInt64Array};
 use arrow_schema::{DataType, Field, Schema};
+use arrow_select::take::take;
 use lanesweep::cli::embedded;
 use lanesweep::engine::{Headway, OpenBackend};
 use lanesweep::model::driver::ModelId;
@@ -19,7 +21,7 @@ use lanesweep::run::cases::Cases;
 use lanesweep::scenario::{CaseParameters, CaseQuantity, Category, NamedNumber, Written};
 use lanesweep::support::plain_text::nearest;
 use lanesweep::support::readable::counted;
-use lanesweep::support::table::ArrowRows;
+use lanesweep::support::table::{ArrowRows, ColumnKind};
 use lanesweep::{Error, Place, Result};
 use pyo3::prelude::*;
 
@@ -30,13 +32,19 @@ use crate::verb::watched;
 /// Cases that are planned and run together: memory does not grow with the table beyond its result.
 const CASES: usize = 1 << 16;
 
-/// A column of a batch as numbers; null and NaN are missing values.
+/// A column of a batch as numbers; null is a missing value.
 fn numbers(array: &dyn Array) -> Option<Vec<Option<f64>>> {
     macro_rules! of {
         ($($type:ident => $arrow:ident),+) => {
             match array.data_type() {
                 $(DataType::$type => array.as_primitive::<$arrow>().iter().map(|v| v.map(|v| v as f64)).collect(),)+
                 DataType::Null => vec![None; array.len()],
+                DataType::Float16 => array.as_primitive::<Float16Type>().iter().map(|v| v.map(f64::from)).collect(),
+                DataType::Decimal128(_, scale) => {
+                    let unit = 10_f64.powi((*scale).into());
+                    array.as_primitive::<Decimal128Type>().iter().map(|v| v.map(|v| v as f64 / unit)).collect()
+                }
+                DataType::Dictionary(..) => of_names(array, numbers)?,
                 _ => return None,
             }
         };
@@ -54,57 +62,36 @@ fn texts(array: &dyn Array) -> Option<Vec<Option<String>>> {
         DataType::Utf8 => array.as_string::<i32>().iter().map(owned).collect(),
         DataType::LargeUtf8 => array.as_string::<i64>().iter().map(owned).collect(),
         DataType::Utf8View => array.as_string_view().iter().map(owned).collect(),
-        DataType::Dictionary(..) => {
-            let names = array.as_any_dictionary_opt()?;
-            let values = texts(names.values().as_ref())?;
-            let keys = names.normalized_keys();
-            (0..array.len()).map(|row| if array.is_null(row) { None } else { values[keys[row]].clone() }).collect()
-        }
+        DataType::Dictionary(..) => of_names(array, texts)?,
         _ => return None,
     })
+}
+
+/// The values of a dictionary, row by row.
+fn of_names<T: Clone>(array: &dyn Array, of: fn(&dyn Array) -> Option<Vec<Option<T>>>) -> Option<Vec<Option<T>>> {
+    let names = array.as_any_dictionary_opt()?;
+    let values = of(names.values().as_ref())?;
+    if values.is_empty() {
+        return Some(vec![None; array.len()]);
+    }
+    let keys = names.normalized_keys();
+    Some((0..array.len()).map(|row| if array.is_null(row) { None } else { values[keys[row]].clone() }).collect())
 }
 
 fn of_column(name: &str, problem: String, help: &str) -> Error {
     Error::input(Place::default().column(name), problem, help)
 }
 
-/// A column of the given table that the result repeats in every row of its case.
-enum Carried {
-    Numbers(Vec<Option<f64>>),
-    Whole(Vec<Option<i64>>),
-    Flags(Vec<Option<bool>>),
-    Texts(Vec<Option<String>>),
-}
-
-impl Carried {
-    fn of(name: &str, array: &dyn Array) -> Result<Carried> {
-        if array.data_type().is_integer()
-            && let Some(values) = numbers(array)
-        {
-            return Ok(Carried::Whole(values.into_iter().map(|value| value.map(|value| value as i64)).collect()));
-        }
-        if let Some(flags) = array.as_boolean_opt() {
-            return Ok(Carried::Flags(flags.iter().collect()));
-        }
-        let found = numbers(array).map(Carried::Numbers).or_else(|| texts(array).map(Carried::Texts));
-        found.ok_or_else(|| {
-            let problem = format!("holds values of the type {}, which the result cannot repeat", array.data_type());
-            of_column(name, problem, "leave it out, or turn it into texts or numbers")
-        })
+/// A column that the result repeats in every row of its case: numbers and texts as ours, other types as they are.
+fn carried_values(array: &ArrayRef) -> ArrayRef {
+    let values = array.as_ref();
+    if values.data_type().is_integer()
+        && let Some(values) = numbers(values)
+    {
+        return Arc::new(values.into_iter().map(|value| value.map(|value| value as i64)).collect::<Int64Array>());
     }
-
-    /// With every value so many times.
-    fn repeated(&self, times: usize) -> ArrayRef {
-        fn each<T: Clone>(values: &[Option<T>], times: usize) -> impl Iterator<Item = Option<T>> + '_ {
-            values.iter().flat_map(move |value| std::iter::repeat_n(value.clone(), times))
-        }
-        match self {
-            Carried::Numbers(values) => Arc::new(each(values, times).collect::<Float64Array>()),
-            Carried::Whole(values) => Arc::new(each(values, times).collect::<Int64Array>()),
-            Carried::Flags(values) => Arc::new(each(values, times).collect::<BooleanArray>()),
-            Carried::Texts(values) => Arc::new(each(values, times).collect::<StringArray>()),
-        }
-    }
+    let found = numbers(values).map(|values| Arc::new(Float64Array::from(values)) as ArrayRef);
+    found.or_else(|| Some(Arc::new(StringArray::from(texts(values)?)))).unwrap_or_else(|| array.clone())
 }
 
 /// What a table of cases may say elsewhere and all rows share here.
@@ -132,7 +119,7 @@ fn looks_like_a_quantity(name: &str, array: &dyn Array) -> Option<String> {
 }
 
 /// The columns of a batch that say nothing of a case: its id, and others.
-fn carried(batch: &RecordBatch, outcome: &Schema) -> Result<Vec<(String, Carried)>> {
+fn carried(batch: &RecordBatch, outcome: &Schema) -> Result<Vec<(String, ArrayRef)>> {
     let is_own = |name: &str| name == "category" || matches!(NamedNumber::find(name), Err(_) | Ok(Some(_)));
     let columns = batch.schema();
     let columns = columns.fields().iter().zip(batch.columns()).filter(|(field, _)| !is_own(field.name()));
@@ -155,7 +142,7 @@ fn carried(batch: &RecordBatch, outcome: &Schema) -> Result<Vec<(String, Carried
             let help = format!("call it `{near}` if this is meant; a column of your own needs another name");
             return Err(of_column(name, "there is no such column".to_owned(), &help));
         }
-        Ok((name.clone(), Carried::of(name, array.as_ref())?))
+        Ok((name.clone(), carried_values(array)))
     };
     columns.map(of).collect()
 }
@@ -275,6 +262,7 @@ fn options(
     dt: Option<f64>,
     backend: &str,
     device: Option<&str>,
+    reference: bool,
     accept_implausible: bool,
 ) -> Result<Options> {
     let mut profile = Profile::load(profile)?;
@@ -288,13 +276,20 @@ fn options(
         })
     };
     let models: Vec<ModelId> = models.iter().map(model).collect::<Result<_>>()?;
+    let opened = match reference {
+        true if backend == "gpu" || device.is_some() => {
+            let problem = "binary64 runs on the CPU";
+            return Err(Error::usage(Place::option("reference"), problem, "leave out the device, or `reference`"));
+        }
+        true => OpenBackend::reference(),
+        false => OpenBackend::open(backend.parse()?, device.map(str::parse).transpose()?.as_ref())?,
+    };
     Ok(Options {
         category,
         models: if models.is_empty() { ModelId::ALL.to_vec() } else { models },
         headways: thw.iter().map(|text| headway_of(text)).collect::<Result<_>>()?,
         profile,
-        backend: OpenBackend::open(backend.parse()?, device.map(str::parse).transpose()?.as_ref())?
-            .with_cancel(embedded::token()),
+        backend: opened.with_cancel(embedded::token()),
         implausible: if accept_implausible { Implausible::Accepted } else { Implausible::Refused },
     })
 }
@@ -306,17 +301,18 @@ fn run(rows: Vec<CaseParameters>, first_row: u64, options: &Options, to: &mut Ar
     let outcomes = cases.run(&options.backend.executor())?;
     let plan = cases.lane_plan();
     let per_row = plan.headways.len() * models.len();
-    for (at, outcome) in outcomes.iter().enumerate() {
+    for (at, (outcome, is_robust)) in outcomes.iter().zip(cases.robust(&outcomes)).enumerate() {
         let (row, headway, model) = (at / per_row, at / models.len() % plan.headways.len(), at % models.len());
         let row = first_row + row as u64;
-        to.row(&case_row(row, plan.headways[headway], models[model].name(), outcome, profile.frame.dt_s))?;
+        let lane = (row, plan.headways[headway], models[model].name());
+        to.row(&case_row(lane, outcome, is_robust, profile.frame.dt_s))?;
     }
     Ok(cases.notes)
 }
 
 /// Runs a table of concrete cases. See `lanesweep.simulate`.
 #[pyfunction]
-#[pyo3(signature = (cases, *, category, models, thw, profile, dt, backend, device, accept_implausible, on_message=None))]
+#[pyo3(signature = (cases, *, category, models, thw, profile, dt, backend, device, reference, accept_implausible, on_message=None))]
 #[allow(clippy::too_many_arguments)] // keyword arguments of the Python function
 pub fn simulate(
     py: Python<'_>,
@@ -328,6 +324,7 @@ pub fn simulate(
     dt: Option<f64>,
     backend: String,
     device: Option<String>,
+    reference: bool,
     accept_implausible: bool,
     on_message: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<(Frame, Vec<String>)> {
@@ -337,9 +334,11 @@ pub fn simulate(
         .map_err(|error| input_error(format!("the table cannot be read: {error}")))?;
     watched(py, None, on_message, move || {
         embedded::exclusively(|| {
+            let device = device.as_deref();
             let options =
-                options(category, &models, &thw, &profile, dt, &backend, device.as_deref(), accept_implausible)?;
-            let mut rows = ArrowRows::new(&case_columns(), HashMap::new());
+                options(category, &models, &thw, &profile, dt, &backend, device, reference, accept_implausible)?;
+            let value = if reference { ColumnKind::Binary64 } else { ColumnKind::Binary32 };
+            let mut rows = ArrowRows::new(&case_columns(value), HashMap::new());
             let outcome = rows.schema();
             let mut schema = outcome.clone();
             let (mut frames, mut notes, mut first_row, mut ids) = (Vec::new(), Vec::new(), 0, HashMap::new());
@@ -364,8 +363,13 @@ pub fn simulate(
                 let of_result = carried(&piece, &outcome)?;
                 let times = batch.num_rows() / piece.num_rows().max(1);
                 let (mut fields, mut columns) = (outcome.fields().to_vec(), batch.columns().to_vec());
+                let rows: UInt64Array =
+                    (0..piece.num_rows() as u64).flat_map(|row| std::iter::repeat_n(row, times)).collect();
                 for (name, values) in of_result {
-                    columns.push(values.repeated(times));
+                    columns.push(
+                        take(&values, &rows, None)
+                            .map_err(|error| of_column(&name, error.to_string(), "leave it out"))?,
+                    );
                     fields.push(Arc::new(Field::new(name, columns[columns.len() - 1].data_type().clone(), true)));
                 }
                 schema = Arc::new(Schema::new_with_metadata(fields, outcome.metadata().clone()));

@@ -1,16 +1,24 @@
-//! Drivers in Python: called once per step with arrays over all running lanes.
+//! Drivers in Python, called once per step with rows over all running lanes; and compiled ones, called in threads.
 
 use std::cell::Cell;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use lanesweep::cli::embedded;
-use lanesweep::model::driver::{Accelerations, LaneColumns, ModelId, VectorDriver, VehicleColumns};
+use lanesweep::model::driver::{Accelerations, LaneColumns, ModelId, VectorDriver};
 use lanesweep::{Error, Place, Result};
-use numpy::{PyArray1, PyReadonlyArray1, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 
 use crate::error::{exception, usage_error};
+
+/// Lanes of a batch of a compiled driver: their rows and states fit into a core's second cache.
+const BATCH_LANES: usize = 512;
+/// A compiled driver is compared with `acceleration` over as many lanes, and over as many of their steps.
+const COMPARED_LANES: usize = 512;
+const COMPARED_STEPS: u32 = 250;
+/// Largest difference of the two, m/s² and relative: both round as they like.
+const TOLERANCE: f32 = 1e-3;
 
 /// The exception that ended the driver of the running work.
 static RAISED: Mutex<Option<PyErr>> = Mutex::new(None);
@@ -29,100 +37,30 @@ pub fn take_exception() -> Option<PyErr> {
 }
 
 /// The error of a driver that raised an exception.
-pub fn error_of(py: Python<'_>, raised: &PyErr) -> Error {
+pub fn error_of(py: Python<'_>, place: String, raised: &PyErr) -> Error {
     let text = raised.value(py).repr().map_or_else(|_| "an exception".to_owned(), |text| text.to_string());
-    Error::input(Place::item("a driver"), format!("it raised {text}"), "see the exception that caused this")
+    Error::input(Place::item(place), format!("it raised {text}"), "see the exception that caused this")
 }
 
-/// Another vehicle as the drivers of all running lanes see it: an entry per lane.
-#[pyclass(frozen, module = "lanesweep")]
-pub struct Vehicle {
-    /// The vehicle is there for the ego; where it is not, the other entries have no meaning.
-    #[pyo3(get)]
-    present: Py<PyArray1<bool>>,
-    /// It is there, and the attention rule lets the driver react to it.
-    #[pyo3(get)]
-    attended: Py<PyArray1<bool>>,
-    /// Speed, m/s.
-    #[pyo3(get)]
-    speed: Py<PyArray1<f32>>,
-    /// Gap, bumper to bumper, m.
-    #[pyo3(get)]
-    gap: Py<PyArray1<f32>>,
-    /// Lateral gap, m.
-    #[pyo3(get)]
-    lateral_gap: Py<PyArray1<f32>>,
-    /// Lateral speed towards the ego, m/s.
-    #[pyo3(get)]
-    lateral_speed: Py<PyArray1<f32>>,
-    /// Half the sum of both lengths, m.
-    #[pyo3(get)]
-    half_lengths: Py<PyArray1<f32>>,
-}
+/// See `lanesweep.Driver.compiled`.
+#[allow(unsafe_code)] // the type of a function in C
+type Function = unsafe extern "C" fn(
+    lanes: i64,
+    stride: i64,
+    step: i64,
+    dt_s: f64,
+    view: *const f32,
+    state: *mut f32,
+    parameters: *const f32,
+    acceleration: *mut f32,
+);
 
-/// All running lanes at one step: an entry per lane.
-#[pyclass(frozen, module = "lanesweep")]
-pub struct View {
-    /// Index of the step.
-    #[pyo3(get)]
-    step: u32,
-    /// Time since the start, s.
-    #[pyo3(get)]
-    time_s: f64,
-    /// Position of each lane in its batch, ascending: the index of its entry in arrays of states.
-    #[pyo3(get)]
-    lane: Py<PyArray1<i64>>,
-    /// Speed of the ego, m/s.
-    #[pyo3(get)]
-    ego_speed: Py<PyArray1<f32>>,
-    /// Acceleration of the ego over the last step, m/s²; 0 at the start.
-    #[pyo3(get)]
-    ego_acceleration: Py<PyArray1<f32>>,
-    /// The principal vehicle: it cuts in, cuts out, or leads.
-    #[pyo3(get)]
-    other: Py<Vehicle>,
-    /// In a cut-out, the vehicle ahead of the one that cuts out; elsewhere it is not present.
-    #[pyo3(get)]
-    ahead: Py<Vehicle>,
-}
-
-#[pymethods]
-impl View {
-    fn __len__(&self, py: Python<'_>) -> usize {
-        self.lane.bind(py).len()
-    }
-}
-
-fn vehicle(py: Python<'_>, of: VehicleColumns) -> PyResult<Py<Vehicle>> {
-    let numbers = |values: Vec<f32>| PyArray1::from_vec(py, values).unbind();
-    Py::new(
-        py,
-        Vehicle {
-            present: PyArray1::from_vec(py, of.present).unbind(),
-            attended: PyArray1::from_vec(py, of.attended).unbind(),
-            speed: numbers(of.speed),
-            gap: numbers(of.gap),
-            lateral_gap: numbers(of.lateral_gap),
-            lateral_speed: numbers(of.lateral_speed),
-            half_lengths: numbers(of.half_lengths),
-        },
-    )
-}
-
-fn view(py: Python<'_>, columns: LaneColumns) -> PyResult<Py<View>> {
-    let [other, ahead] = columns.vehicles;
-    Py::new(
-        py,
-        View {
-            step: columns.step,
-            time_s: columns.time_s,
-            lane: PyArray1::from_vec(py, columns.lane).unbind(),
-            ego_speed: PyArray1::from_vec(py, columns.ego_speed).unbind(),
-            ego_acceleration: PyArray1::from_vec(py, columns.ego_acceleration).unbind(),
-            other: vehicle(py, other)?,
-            ahead: vehicle(py, ahead)?,
-        },
-    )
+struct Compiled {
+    function: Function,
+    parameters: Vec<f32>,
+    state_rows: usize,
+    /// Lanes that were compared with `acceleration`.
+    compared: AtomicUsize,
 }
 
 struct PythonDriver {
@@ -130,17 +68,33 @@ struct PythonDriver {
     driver: Py<PyAny>,
     may_accelerate: bool,
     stands_for: ModelId,
+    compiled: Option<Compiled>,
 }
 
 impl PythonDriver {
     /// Keeps the exception for the caller and returns the error that ends the run.
     fn failed(&self, py: Python<'_>, at: &str, raised: PyErr) -> Error {
-        let problem = format!(
-            "it raised {}",
-            raised.value(py).repr().map_or_else(|_| "an exception".into(), |text| text.to_string())
-        );
+        let error = error_of(py, format!("driver {}, {at}", self.name), &raised);
         *RAISED.lock().unwrap_or_else(PoisonError::into_inner) = Some(raised);
-        Error::input(Place::item(format!("driver {}, {at}", self.name)), problem, "see the exception that caused this")
+        error
+    }
+
+    /// Calls `acceleration`.
+    fn decide(&self, state: &Py<PyAny>, columns: &LaneColumns, rows: Vec<f32>, decided: &mut [f32]) -> Result<()> {
+        let step = columns.step;
+        attached(|py| {
+            let found = (|| -> PyResult<()> {
+                let rows = PyArray1::from_vec(py, rows);
+                let lane = PyArray1::from_slice(py, &columns.lane);
+                let time_s = f64::from(step) * columns.dt_s;
+                let found = py.import("lanesweep._driver")?;
+                let found = found.call_method1("decided", (&self.driver, state, step, time_s, lane, rows))?;
+                let found: PyReadonlyArray1<'_, f32> = found.extract()?;
+                decided.copy_from_slice(found.as_slice()?);
+                Ok(())
+            })();
+            found.map_err(|raised| self.failed(py, &format!("step {step}"), raised))
+        })
     }
 }
 
@@ -153,22 +107,87 @@ impl VectorDriver for PythonDriver {
         self.may_accelerate
     }
 
+    fn batch_lanes(&self) -> usize {
+        if self.compiled.is_some() { BATCH_LANES } else { usize::MAX }
+    }
+
+    fn state_rows(&self) -> usize {
+        self.compiled.as_ref().map_or(0, |compiled| compiled.state_rows)
+    }
+
     fn start(&self, lanes: usize, dt_s: f64) -> Result<Accelerations<'_>> {
-        let state = attached(|py| {
-            let state = self.driver.bind(py).call_method1("start", (lanes, dt_s));
-            state.map(Bound::unbind).map_err(|raised| self.failed(py, "start", raised))
-        })?;
-        Ok(Box::new(move |columns| {
+        let is_compared = |compiled: &Compiled| {
+            let compared = &compiled.compared;
+            compared.load(Ordering::Relaxed) < COMPARED_LANES
+                && compared.fetch_add(lanes, Ordering::Relaxed) < COMPARED_LANES
+        };
+        let asks_python = self.compiled.as_ref().is_none_or(is_compared);
+        let state = asks_python.then(|| {
+            attached(|py| {
+                let state = self.driver.bind(py).call_method1("start", (lanes, dt_s));
+                state.map(Bound::unbind).map_err(|raised| self.failed(py, "start", raised))
+            })
+        });
+        let state = state.transpose()?;
+        let mut differing = vec![false; lanes];
+        Ok(Box::new(move |columns, decided| {
             if embedded::token().requested() {
                 return Err(Error::Interrupted { done: "a driver was stopped".to_owned(), is_kept: false });
             }
-            let (step, count) = (columns.step, columns.lane.len());
-            attached(|py| {
-                let found = accelerations(py, self.driver.bind(py), state.bind(py), columns, count);
-                found.map_err(|raised| self.failed(py, &format!("step {step}"), raised))
-            })
+            match (&self.compiled, &state) {
+                (None, Some(state)) => {
+                    let rows = std::mem::take(&mut columns.rows);
+                    self.decide(state, columns, rows, decided)
+                }
+                (Some(compiled), Some(state)) if columns.step < COMPARED_STEPS => {
+                    compiled.call(columns, decided);
+                    let mut expected = vec![0.0; decided.len()];
+                    self.decide(state, columns, columns.rows.clone(), &mut expected)?;
+                    compare(&self.name, columns, decided, &expected, &mut differing)
+                }
+                (compiled, _) => {
+                    if let Some(compiled) = compiled {
+                        compiled.call(columns, decided);
+                    }
+                    Ok(())
+                }
+            }
         }))
     }
+}
+
+impl Compiled {
+    #[allow(unsafe_code)] // a function in C
+    fn call(&self, columns: &mut LaneColumns, decided: &mut [f32]) {
+        let LaneColumns { step, dt_s, stride, rows, state, .. } = columns;
+        let (lanes, stride) = (decided.len() as i64, *stride as i64);
+        let (view, state, parameters) = (rows.as_ptr(), state.as_mut_ptr(), self.parameters.as_ptr());
+        IS_CALLING.set(true);
+        // SAFETY: whoever gives the function promises that it reads and writes what `Driver.compiled` says.
+        unsafe { (self.function)(lanes, stride, (*step).into(), *dt_s, view, state, parameters, decided.as_mut_ptr()) };
+        IS_CALLING.set(false);
+    }
+}
+
+/// Checks the decisions of a compiled driver against those of `acceleration`. Where a decision flips at a limit, rounding
+/// may flip it: one lane in a hundred may differ.
+fn compare(name: &str, columns: &LaneColumns, decided: &[f32], expected: &[f32], differing: &mut [bool]) -> Result<()> {
+    for ((&lane, compiled), expected) in columns.lane.iter().zip(decided).zip(expected) {
+        if (compiled - expected).abs() <= TOLERANCE * expected.abs().max(1.0) {
+            continue;
+        }
+        differing[lane as usize] = true;
+        let lanes = differing.iter().filter(|differs| **differs).count();
+        if lanes * 100 > differing.len() {
+            let problem = format!(
+                "`compiled` decides {compiled} m/s² where `acceleration` decides {expected}; they differ in {lanes} of {} lanes",
+                differing.len()
+            );
+            let help = "make both the same driver, or give only one";
+            return Err(Error::input(Place::item(format!("driver {name}, step {}", columns.step)), problem, help));
+        }
+    }
+    Ok(())
 }
 
 /// Calls Python, unless the interpreter is ending.
@@ -183,36 +202,8 @@ fn attached<T>(work: impl for<'py> FnOnce(Python<'py>) -> Result<T>) -> Result<T
     Python::try_attach(work).unwrap_or_else(|| Err(ending()))
 }
 
-fn accelerations(
-    py: Python<'_>,
-    driver: &Bound<'_, PyAny>,
-    state: &Bound<'_, PyAny>,
-    columns: LaneColumns,
-    count: usize,
-) -> PyResult<Vec<f32>> {
-    let found = driver.call_method1("acceleration", (view(py, columns)?, state))?;
-    // NumPy converts lists, scalars, and arrays of other libraries and types.
-    let numpy = py.import("numpy")?;
-    let arguments = PyDict::new(py);
-    arguments.set_item("dtype", "float32")?;
-    let found = numpy.call_method("asarray", (found,), Some(&arguments))?;
-    let found: PyReadonlyArray1<'_, f32> = match found.getattr("ndim")?.extract::<usize>()? {
-        0 => numpy.call_method1("full", (count, found.call_method0("item")?, "float32"))?.extract()?,
-        1 => found.extract()?,
-        ndim => {
-            let shape = found.getattr("shape")?;
-            return Err(usage_error(format!(
-                "`acceleration` returned an array of {ndim} dimensions and the shape {shape}; expected one number per lane: ({count},)"
-            )));
-        }
-    };
-    if found.len() != count {
-        return Err(usage_error(format!("`acceleration` returned {} numbers for {count} lanes", found.len())));
-    }
-    Ok(found.as_array().to_vec())
-}
-
-/// Registers a driver and returns its name.
+/// Registers a driver; `compiled` is the address of its function, with parameters, the number of rows of its state, and
+/// whether it is compared with `acceleration`.
 #[pyfunction]
 pub fn register(
     py: Python<'_>,
@@ -221,10 +212,18 @@ pub fn register(
     driver: Py<PyAny>,
     may_accelerate: bool,
     attention: &str,
+    compiled: Option<(usize, Vec<f32>, usize, bool)>,
 ) -> PyResult<()> {
     let stands_for = ModelId::parse(attention).ok_or_else(|| {
         usage_error(format!("`attention` names no built-in model: `{attention}`; use one of {}", ModelId::names()))
     })?;
-    let python = PythonDriver { name: name.clone(), driver, may_accelerate, stands_for };
+    let compiled = compiled.map(|(address, parameters, state_rows, is_compared)| {
+        #[allow(unsafe_code)] // an address of a function in C
+        // SAFETY: it is not 0 (`_driver.py`); whoever gives the address promises the rest.
+        let function = unsafe { std::mem::transmute::<usize, Function>(address) };
+        let compared = AtomicUsize::new(if is_compared { 0 } else { COMPARED_LANES });
+        Compiled { function, parameters, state_rows, compared }
+    });
+    let python = PythonDriver { name: name.clone(), driver, may_accelerate, stands_for, compiled };
     ModelId::register(&name, fingerprint, Arc::new(python)).map(drop).map_err(|error| exception(py, &error))
 }

@@ -7,18 +7,20 @@ use std::sync::Arc;
 use arrow_array::cast::AsArray;
 use arrow_array::ffi_stream::{FFI_ArrowArrayStream, RecordBatchStreamReader};
 use arrow_array::types::{Float32Type, Float64Type, Int32Type, Int64Type};
-use arrow_array::{Array, ArrayRef, Float64Array, RecordBatch, RecordBatchIterator, RecordBatchReader, StringArray};
+use arrow_array::{
+    Array, ArrayRef, ArrowPrimitiveType, Float64Array, RecordBatch, RecordBatchIterator, RecordBatchReader, StringArray,
+};
 use arrow_ipc::reader::StreamReader;
 use arrow_ipc::writer::StreamWriter;
 use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
-use lanesweep::support::table::{ArrowRows, Cell, Column, ColumnKind};
+use lanesweep::report::column_words::explain;
+use lanesweep::support::table::{ArrowRows, Table};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::{PyKeyError, PyTypeError};
 use pyo3::prelude::*;
-use pyo3::types::{IntoPyDict, PyBytes, PyCapsule, PyDict, PyFloat, PyIterator, PyList, PyString};
-use serde_json::Value;
+use pyo3::types::{IntoPyDict, PyBytes, PyCapsule, PyDict, PyFloat, PyList};
 
-use crate::error::{InternalError, exception, input_error};
+use crate::error::{InternalError, input_error};
 
 const STREAM: &std::ffi::CStr = c"arrow_array_stream";
 
@@ -34,6 +36,19 @@ impl Frame {
     pub fn new(schema: SchemaRef, batches: Vec<RecordBatch>) -> Frame {
         Frame { schema, batches }
     }
+
+    /// A table of a result.
+    pub fn of(mut table: Table) -> lanesweep::Result<Frame> {
+        explain(&mut table);
+        let mut rows = ArrowRows::new(&table.columns, HashMap::new());
+        table.rows.iter().try_for_each(|row| rows.row(row))?;
+        let batch = rows.batch()?;
+        Ok(Frame::new(rows.schema(), vec![batch]))
+    }
+}
+
+fn failed(error: ArrowError) -> PyErr {
+    InternalError::new_err(format!("a table: {error}"))
 }
 
 /// A cell for readers.
@@ -90,69 +105,66 @@ impl Frame {
         (self.__len__(), self.schema.fields().len())
     }
 
-    /// The rows, as dictionaries.
-    fn __iter__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyIterator>> {
-        self.rows(py, None)?.try_iter()
-    }
-
     /// A copy by way of Arrow's format for streams.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
-        let failed = |error: ArrowError| InternalError::new_err(format!("a table: {error}"));
         let mut writer = StreamWriter::try_new(Vec::new(), &self.schema).map_err(failed)?;
         self.batches.iter().try_for_each(|batch| writer.write(batch)).map_err(failed)?;
         let bytes = writer.into_inner().map_err(failed)?;
         Ok((py.import("lanesweep._core")?.getattr("frame_of_stream")?, (PyBytes::new(py, &bytes),)))
     }
 
-    /// A column as a NumPy array; texts as a list. Null is NaN in columns of numbers and None in others. Of a list of names:
-    /// a table of these columns.
-    fn __getitem__<'py>(&self, py: Python<'py>, name: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        if let Ok(names) = name.cast::<PyList>() {
-            let at: Vec<usize> =
-                names.iter().map(|name| self.at(&name.extract::<String>()?)).collect::<PyResult<_>>()?;
-            let failed = |error: ArrowError| InternalError::new_err(format!("a table: {error}"));
-            let schema = Arc::new(self.schema.project(&at).map_err(failed)?);
-            let batches = self.batches.iter().map(|batch| batch.project(&at)).collect::<Result<_, _>>();
-            return Ok(Bound::new(py, Frame::new(schema, batches.map_err(failed)?))?.into_any());
-        }
-        let at = self.at(&name.extract::<String>()?)?;
-        let arrays: Vec<&dyn Array> = self.batches.iter().map(|batch| batch.column(at).as_ref()).collect();
+    /// A column as a NumPy array: null is NaN among numbers and None elsewhere, texts are objects.
+    fn __getitem__<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        let (py, this) = (slf.py(), slf.get());
+        let unknown = || format!("there is no column `{name}`; there are {}", this.columns().join(", "));
+        let at = this.schema.index_of(name).map_err(|_| PyKeyError::new_err(unknown()))?;
+        let arrays: Vec<&dyn Array> = this.batches.iter().map(|batch| batch.column(at).as_ref()).collect();
         let has_null = arrays.iter().any(|array| array.null_count() > 0);
-        match self.schema.field(at).data_type() {
-            DataType::Float64 => {
-                let values = arrays.iter().flat_map(|array| array.as_primitive::<Float64Type>().iter());
-                Ok(PyArray1::from_iter(py, values.map(|value| value.unwrap_or(f64::NAN))).into_any())
+        Ok(match this.schema.field(at).data_type() {
+            DataType::Float64 => numbers::<Float64Type, _>(py, &arrays, |value| value.unwrap_or(f64::NAN)),
+            DataType::Float32 => numbers::<Float32Type, _>(py, &arrays, |value| value.unwrap_or(f32::NAN)),
+            DataType::Int64 if has_null => {
+                numbers::<Int64Type, _>(py, &arrays, |value| value.map_or(f64::NAN, |value| value as f64))
             }
-            DataType::Float32 => {
-                let values = arrays.iter().flat_map(|array| array.as_primitive::<Float32Type>().iter());
-                Ok(PyArray1::from_iter(py, values.map(|value| value.unwrap_or(f32::NAN))).into_any())
-            }
-            DataType::Int64 if !has_null => {
-                let values = arrays.iter().flat_map(|array| array.as_primitive::<Int64Type>().iter().flatten());
-                Ok(PyArray1::from_iter(py, values).into_any())
-            }
+            DataType::Int64 => numbers::<Int64Type, _>(py, &arrays, Option::unwrap_or_default),
             DataType::Boolean if !has_null => {
                 let values = arrays.iter().flat_map(|array| array.as_boolean().iter().flatten());
-                Ok(PyArray1::from_iter(py, values).into_any())
+                PyArray1::from_iter(py, values).into_any()
             }
-            _ => {
-                let list = PyList::empty(py);
-                for array in arrays {
-                    (0..array.len()).try_for_each(|row| list.append(value(py, array, row)?))?;
-                }
-                Ok(list.into_any())
+            DataType::Utf8 | DataType::Dictionary(..) | DataType::List(_) | DataType::Boolean => {
+                let rows = arrays.iter().flat_map(|array| (0..array.len()).map(move |row| (*array, row)));
+                let objects = rows.map(|(array, row)| Ok(value(py, array, row)?.unbind()));
+                PyArray1::from_vec(py, objects.collect::<PyResult<Vec<Py<PyAny>>>>()?).into_any()
             }
-        }
+            // Of another library: a time stamp.
+            _ => py.import("pyarrow")?.call_method1("table", (slf,))?.get_item(name)?.call_method0("to_numpy")?,
+        })
     }
 
-    /// The table as a pandas data frame (a copy).
+    /// The columns as NumPy arrays, by their names.
+    fn to_numpy<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
+        let columns = PyDict::new(slf.py());
+        slf.get().columns().iter().try_for_each(|name| columns.set_item(name, Self::__getitem__(slf, name)?))?;
+        Ok(columns)
+    }
+
+    /// The table as a pandas data frame (a copy). Whole numbers with nulls stay whole.
     fn to_pandas<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let py = slf.py();
-        let columns = PyDict::new(py);
-        for name in slf.get().columns() {
-            columns.set_item(&name, slf.get().__getitem__(py, PyString::new(py, &name).as_any())?)?;
+        let pandas = slf.py().import("pandas")?;
+        let columns = Self::to_numpy(slf)?;
+        for (name, values) in columns.iter() {
+            let field = slf.get().schema.field_with_name(name.extract()?).map_err(failed)?;
+            let is_float = values.getattr("dtype")?.getattr("kind")?.extract::<char>()? == 'f';
+            match field.data_type() {
+                DataType::Int64 if is_float => {
+                    columns.set_item(&name, pandas.call_method1("array", (values, "Int64"))?)?
+                }
+                // pandas tells the type of texts from a list.
+                DataType::Utf8 | DataType::Dictionary(..) => columns.set_item(&name, values.call_method0("tolist")?)?,
+                _ => {}
+            }
         }
-        py.import("pandas")?.call_method1("DataFrame", (columns,))
+        pandas.call_method1("DataFrame", (columns,))
     }
 
     /// The table as a Polars data frame.
@@ -160,32 +172,17 @@ impl Frame {
         slf.py().import("polars")?.call_method1("DataFrame", (slf,))
     }
 
-    /// The table as a pyarrow table.
-    fn to_arrow<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        slf.py().import("pyarrow")?.call_method1("table", (slf,))
-    }
-
-    /// The first rows, as many columns as a line of 120 characters holds.
+    /// The first rows, cut after 120 characters.
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        const WIDTH: usize = 120;
         let mut table = vec![self.columns()];
-        for row in self.rows(py, Some(10))?.iter() {
-            let row = row.cast::<PyDict>()?.values();
-            table.push(row.iter().map(|cell| shown(&cell)).collect::<PyResult<Vec<String>>>()?);
-        }
+        table.extend(self.first_rows(py, 10)?);
         let width = |at: usize| table.iter().map(|row| row[at].chars().count()).max().unwrap_or(0);
         let widths: Vec<usize> = (0..table[0].len()).map(width).collect();
-        let ends = widths.iter().scan(0, |end, width| {
-            *end += width + 2;
-            Some(*end)
-        });
-        let fitting = ends.take_while(|end| *end <= WIDTH).count().max(1).min(widths.len());
         let cell = |(text, width): (&String, &usize)| format!("{text:>width$}");
-        let line = |row: &Vec<String>| row.iter().zip(&widths).take(fitting).map(cell).collect::<Vec<_>>().join("  ");
-        let lines: Vec<String> = table.iter().map(line).collect();
-        let more = widths.len() - fitting;
-        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-        Ok(format!("{}\n[{} rows; {fitting} columns{more}]", lines.join("\n"), self.__len__()))
+        let line = |row: &Vec<String>| row.iter().zip(&widths).map(cell).collect::<Vec<_>>().join("  ");
+        let cut = |row| line(row).chars().take(120).collect::<String>().trim_end().to_owned();
+        let lines: Vec<String> = table.iter().map(cut).collect();
+        Ok(format!("{}\n[{} rows; {} columns]", lines.join("\n"), self.__len__(), widths.len()))
     }
 
     fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {
@@ -198,42 +195,24 @@ impl Frame {
             html += &format!("<th title=\"{}\">{}</th>", escape(title), escape(&name));
         }
         html += "</tr></thead><tbody>";
-        for row in self.rows(py, Some(SHOWN))?.iter() {
-            html += "<tr>";
-            for cell in row.cast::<PyDict>()?.values().iter() {
-                html += &format!("<td>{}</td>", escape(&shown(&cell)?));
-            }
-            html += "</tr>";
+        for row in self.first_rows(py, SHOWN)? {
+            let cells: String = row.iter().map(|cell| format!("<td>{}</td>", escape(cell))).collect();
+            html += &format!("<tr>{cells}</tr>");
         }
         let rows = self.__len__();
         let more = if rows > SHOWN { format!("<p>{SHOWN} of {rows} rows</p>") } else { String::new() };
         Ok(html + "</tbody></table>" + &more)
     }
-
-    /// The first rows as dictionaries.
-    #[pyo3(signature = (n=None))]
-    fn rows<'py>(&self, py: Python<'py>, n: Option<usize>) -> PyResult<Bound<'py, PyList>> {
-        let list = PyList::empty(py);
-        let mut left = n.unwrap_or(usize::MAX);
-        for batch in &self.batches {
-            for row in 0..batch.num_rows().min(left) {
-                let dict = PyDict::new(py);
-                for (field, array) in self.schema.fields().iter().zip(batch.columns()) {
-                    dict.set_item(field.name(), value(py, array.as_ref(), row)?)?;
-                }
-                list.append(dict)?;
-            }
-            left = left.saturating_sub(batch.num_rows());
-        }
-        Ok(list)
-    }
 }
 
 impl Frame {
-    /// Position of a column.
-    fn at(&self, name: &str) -> PyResult<usize> {
-        let unknown = || format!("there is no column `{name}`; there are {}", self.columns().join(", "));
-        self.schema.index_of(name).map_err(|_| PyKeyError::new_err(unknown()))
+    /// The first rows for readers.
+    fn first_rows(&self, py: Python<'_>, count: usize) -> PyResult<Vec<Vec<String>>> {
+        let rows = self.batches.iter().flat_map(|batch| (0..batch.num_rows()).map(move |row| (batch, row)));
+        let shown = |(batch, row): (&RecordBatch, usize)| {
+            batch.columns().iter().map(|array| shown(&value(py, array.as_ref(), row)?)).collect()
+        };
+        rows.take(count).map(shown).collect()
     }
 
     /// What the columns say under a key, in their order.
@@ -244,6 +223,15 @@ impl Frame {
         };
         self.schema.fields().iter().filter_map(of).collect()
     }
+}
+
+/// A column of numbers.
+fn numbers<'py, T: ArrowPrimitiveType, N: numpy::Element>(
+    py: Python<'py>,
+    arrays: &[&dyn Array],
+    of: fn(Option<T::Native>) -> N,
+) -> Bound<'py, PyAny> {
+    PyArray1::from_iter(py, arrays.iter().flat_map(|array| array.as_primitive::<T>().iter()).map(of)).into_any()
 }
 
 /// A value of an array of one of our types.
@@ -268,7 +256,7 @@ fn value<'py>(py: Python<'py>, array: &dyn Array, row: usize) -> PyResult<Bound<
             (0..items.len()).try_for_each(|at| list.append(value(py, items.as_ref(), at)?))?;
             list.into_any()
         }
-        other => return Err(InternalError::new_err(format!("a column has the type {other}"))),
+        other => format!("<{other}>").into_pyobject(py)?.into_any(),
     })
 }
 
@@ -316,64 +304,4 @@ pub fn frame_of_columns(columns: &Bound<'_, PyDict>) -> PyResult<Frame> {
     let schema = Arc::new(Schema::new(fields));
     let batch = RecordBatch::try_new(schema.clone(), arrays);
     Ok(Frame::new(schema, vec![batch.map_err(|error| input_error(format!("the columns: {error}")))?]))
-}
-
-/// A table of records: a list of objects with equal keys, as JSON; columns in this order, then the others. A column has
-/// the type of its values; whole numbers beside others become numbers.
-#[pyfunction]
-#[pyo3(signature = (json, order=vec![]))]
-pub fn frame_of_records(py: Python<'_>, json: &str, order: Vec<String>) -> PyResult<Frame> {
-    let records: Vec<serde_json::Map<String, Value>> =
-        serde_json::from_str(json).map_err(|error| InternalError::new_err(format!("a table: {error}")))?;
-    let mut names: Vec<&String> =
-        order.iter().filter(|name| records.first().is_some_and(|record| record.contains_key(*name))).collect();
-    for name in records.iter().flat_map(|record| record.keys()) {
-        if !names.contains(&name) {
-            names.push(name);
-        }
-    }
-    // JSON has no infinity: the program writes a text.
-    let infinite = |value: &Value| match value.as_str() {
-        Some("Infinity") => Some(f64::INFINITY),
-        Some("-Infinity") => Some(f64::NEG_INFINITY),
-        _ => None,
-    };
-    let kind = |name: &str| {
-        let mut values =
-            records.iter().filter_map(|record| record.get(name)).filter(|value| !value.is_null()).peekable();
-        let has_values = values.peek().is_some();
-        let mut kinds = values.map(|value| match value {
-            Value::Bool(_) => ColumnKind::Flag,
-            Value::Number(number) if number.is_i64() => ColumnKind::Whole,
-            Value::Number(_) => ColumnKind::Binary64,
-            text if infinite(text).is_some() => ColumnKind::Binary64,
-            _ => ColumnKind::Text,
-        });
-        let first = kinds.next().unwrap_or(ColumnKind::Binary64);
-        let joined = kinds.fold(first, |joined, kind| match (joined, kind) {
-            (a, b) if a == b => a,
-            (ColumnKind::Whole | ColumnKind::Binary64, ColumnKind::Whole | ColumnKind::Binary64) => {
-                ColumnKind::Binary64
-            }
-            _ => ColumnKind::Text,
-        });
-        if has_values { joined } else { ColumnKind::Binary64 }
-    };
-    let columns: Vec<Column> =
-        names.iter().map(|name| Column::new((*name).clone(), kind(name), String::new(), String::new())).collect();
-    let mut rows = ArrowRows::new(&columns, HashMap::new());
-    for record in &records {
-        let cell = |column: &Column| match (column.kind, record.get(column.name.as_ref())) {
-            (_, None | Some(Value::Null)) => Cell::Null,
-            (ColumnKind::Text, Some(Value::String(text))) => Cell::text(text.clone()),
-            (ColumnKind::Text, Some(other)) => Cell::text(other.to_string()),
-            (_, Some(Value::Bool(flag))) => Cell::Flag(*flag),
-            (ColumnKind::Whole, Some(number)) => number.as_i64().map_or(Cell::Null, Cell::Whole),
-            (_, Some(number)) => Cell::number(number.as_f64().or_else(|| infinite(number))),
-        };
-        let row: Vec<Cell> = columns.iter().map(cell).collect();
-        rows.row(&row).map_err(|error| exception(py, &error))?;
-    }
-    let batch = rows.batch().map_err(|error| exception(py, &error))?;
-    Ok(Frame::new(rows.schema(), vec![batch]))
 }

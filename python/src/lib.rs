@@ -18,13 +18,10 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     error::add_to(module)?;
     module.add_class::<frame::Frame>()?;
     module.add_class::<limit_state::LimitState>()?;
-    module.add_class::<driver::View>()?;
-    module.add_class::<driver::Vehicle>()?;
     module.add_function(wrap_pyfunction!(verb::run, module)?)?;
     module.add_function(wrap_pyfunction!(verb::main, module)?)?;
     module.add_function(wrap_pyfunction!(verb::described, module)?)?;
     module.add_function(wrap_pyfunction!(verb::profile, module)?)?;
-    module.add_function(wrap_pyfunction!(frame::frame_of_records, module)?)?;
     module.add_function(wrap_pyfunction!(frame::frame_of_columns, module)?)?;
     module.add_function(wrap_pyfunction!(frame::frame_of_stream, module)?)?;
     module.add_function(wrap_pyfunction!(cases::simulate, module)?)?;

@@ -23,6 +23,23 @@ use crate::cases::headway_of;
 use crate::error::exception;
 use crate::verb::watched;
 
+/// Points between two looks for signals: less than a second's work.
+const BATCH: usize = 1 << 14;
+
+/// Works on rows without the GIL; a signal (Ctrl-C) ends it after a batch.
+fn in_batches<T: Send>(
+    py: Python<'_>,
+    rows: &[Vec<f64>],
+    work: impl Fn(&[Vec<f64>]) -> Result<Vec<T>> + Sync,
+) -> PyResult<Vec<T>> {
+    let mut all = Vec::with_capacity(rows.len());
+    for batch in rows.chunks(BATCH / 8) {
+        all.extend(py.detach(|| work(batch)).map_err(|error| exception(py, &error))?);
+        py.check_signals()?;
+    }
+    Ok(all)
+}
+
 struct Opened {
     density: DensityModel,
     profile: Profile,
@@ -86,7 +103,7 @@ impl Opened {
         let is_valid: Vec<bool> = points.iter().map(|point| self.density.space.is_valid(point)).collect();
         let valid = points.into_iter().zip(&is_valid).filter_map(|(point, is_valid)| is_valid.then_some(point));
         let valid: Vec<Vec<f64>> = valid.collect();
-        let found = if valid.is_empty() { Vec::new() } else { embedded::exclusively(|| self.values(&valid))? };
+        let found = if valid.is_empty() { Vec::new() } else { self.values(&valid)? };
         let mut found = found.into_iter();
         let value = |is_valid: bool| if is_valid { found.next() } else { None }.unwrap_or(f64::INFINITY);
         Ok(is_valid.into_iter().map(value).collect())
@@ -96,8 +113,13 @@ impl Opened {
         let question = Question { model: self.model, criterion: self.criterion, headway: 0 };
         let executor = self.backend.executor();
         let lanes = LaneLimitState::new(&self.density, &self.profile, &self.headway, &[question], executor);
-        // The first guide of a point is the limit state.
-        Ok(lanes.evaluate(points)?.into_iter().step_by(lanes.guides()).collect())
+        let mut values = Vec::with_capacity(points.len());
+        for batch in points.chunks(BATCH) {
+            embedded::token().check()?;
+            // The first guide of a point is the limit state.
+            values.extend(lanes.evaluate(batch)?.into_iter().step_by(lanes.guides()));
+        }
+        Ok(values)
     }
 }
 
@@ -153,14 +175,11 @@ impl LimitState {
         py: Python<'py>,
         u: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let rows = self.rows(py, &u)?;
-        let density = &self.0.density;
-        let points = py.detach(|| {
-            let mixture = density.kde.mixture()?;
-            Ok(rows.par_iter().map(|u| mixture.from_standard_normal(u)).collect::<Vec<_>>())
+        let points = in_batches(py, &self.rows(py, &u)?, |rows| {
+            let mixture = self.0.density.kde.mixture()?;
+            Ok(rows.par_iter().map(|u| mixture.from_standard_normal(u)).collect())
         });
-        let points = points.map_err(|error: Error| exception(py, &error))?;
-        Ok(PyArray2::from_vec2(py, &points)?)
+        Ok(PyArray2::from_vec2(py, &points?)?)
     }
 
     /// Whether each point is valid: the density is 0 elsewhere.
@@ -179,9 +198,8 @@ impl LimitState {
         py: Python<'py>,
         points: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let points = self.rows(py, &points)?;
-        let values = py.detach(|| self.0.log_densities(&points));
-        Ok(PyArray1::from_vec(py, values.map_err(|error: Error| exception(py, &error))?))
+        let values = in_batches(py, &self.rows(py, &points)?, |points| self.0.log_densities(points))?;
+        Ok(PyArray1::from_vec(py, values))
     }
 
     /// The limit state of each point; infinite outside the valid region, where the density is 0.
@@ -192,7 +210,7 @@ impl LimitState {
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let points = self.rows(py, &points)?;
         let opened = self.0.clone();
-        let values = watched(py, None, None, move || opened.values_or_infinite(points))?;
+        let values = watched(py, None, None, move || embedded::exclusively(|| opened.values_or_infinite(points)))?;
         Ok(PyArray1::from_vec(py, values))
     }
 
@@ -235,8 +253,10 @@ impl LimitState {
         }
         let opened = self.0.clone();
         watched(py, None, None, move || {
-            let fails: Vec<bool> =
-                opened.values_or_infinite(points.clone())?.iter().map(|value| *value <= 0.0).collect();
+            let fails: Vec<bool> = embedded::exclusively(|| opened.values_or_infinite(points.clone()))?
+                .iter()
+                .map(|value| *value <= 0.0)
+                .collect();
             let is_valid = |point: &&Vec<f64>| opened.density.space.is_valid(point);
             let valid = points.iter().filter(is_valid).count() as u64;
             let mut mean_weight = None;

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use lanesweep::cli::embedded::{self, Given};
 use lanesweep::{Error, Place, Result};
@@ -16,9 +16,12 @@ use pyo3::types::PyDict;
 
 use crate::driver;
 use crate::error::exception;
+use crate::frame::Frame;
 
 /// How often the calling thread looks for signals.
 const LOOK: Duration = Duration::from_millis(20);
+/// How long a call waits for work that nobody waits for: its present chunk ends sooner, unless a driver blocks.
+const PATIENCE: Duration = Duration::from_secs(5);
 
 /// The turn of this process to work: threads take turns.
 struct Turn;
@@ -31,13 +34,15 @@ static IS_LEFT_ALONE: AtomicBool = AtomicBool::new(false);
 impl Turn {
     /// Waits for the turn. Work that a driver asks for, and work behind one that nobody waits for, is refused.
     fn take(py: Python<'_>) -> PyResult<Turn> {
+        let asked = Instant::now();
         loop {
             let (me, owner) = (std::process::id(), OWNER.load(Ordering::Acquire));
             if owner != me && OWNER.compare_exchange(owner, me, Ordering::AcqRel, Ordering::Relaxed).is_ok() {
                 IS_LEFT_ALONE.store(false, Ordering::Release);
                 return Ok(Turn);
             }
-            if driver::is_calling() || IS_LEFT_ALONE.load(Ordering::Acquire) {
+            let is_left_alone = IS_LEFT_ALONE.load(Ordering::Acquire) && asked.elapsed() > PATIENCE;
+            if driver::is_calling() || is_left_alone {
                 let problem = "another run of lanesweep is in progress here".to_owned();
                 return Err(exception(py, &Error::Busy { place: Box::new(Place::item("this process")), problem }));
             }
@@ -83,6 +88,10 @@ pub fn watched<T: Send + 'static>(
             }
             ended = ended.or(Some(error));
         }
+        if ended.is_some() {
+            // Work that began after the signal has not seen the request.
+            embedded::cancel();
+        }
         match result {
             Ok((result, turn)) => break (result, Some(turn)),
             Err(RecvTimeoutError::Disconnected) => break (Err(Error::Internal("the work panicked".to_owned())), None),
@@ -100,7 +109,7 @@ pub fn watched<T: Send + 'static>(
         Some(cause) => {
             let error = match error {
                 // A single lane, whose run cannot fail by itself.
-                Error::Internal(_) => driver::error_of(py, &cause),
+                Error::Internal(_) => driver::error_of(py, "a driver".to_owned(), &cause),
                 other => other,
             };
             let made = exception(py, &error);
@@ -146,7 +155,7 @@ impl From<Argument> for Given {
     }
 }
 
-/// Runs a verb by the name of its function, with the values of named arguments.
+/// Runs a verb by the name of its function, with the values of named arguments: exit code, text, document and tables.
 #[pyfunction]
 #[pyo3(signature = (function, call, arguments, on_progress=None, on_message=None))]
 pub fn run(
@@ -156,11 +165,14 @@ pub fn run(
     arguments: &Bound<'_, PyDict>,
     on_progress: Option<&Bound<'_, PyAny>>,
     on_message: Option<&Bound<'_, PyAny>>,
-) -> PyResult<(u8, String, String)> {
+) -> PyResult<(u8, String, String, Vec<(String, Frame)>)> {
     let given = arguments.iter().map(|(name, one)| Ok((name.extract()?, one.extract::<Argument>()?.into())));
     let given = given.collect::<PyResult<Vec<(String, Given)>>>()?;
-    let output = watched(py, on_progress, on_message, move || embedded::run(&function, call, given))?;
-    Ok((output.exit.code(), output.text, output.document))
+    watched(py, on_progress, on_message, move || {
+        let output = embedded::run(&function, call, given)?;
+        let tables = output.tables.into_iter().map(|(name, table)| Ok((name, Frame::of(table)?)));
+        Ok((output.exit.code(), output.text, output.document, tables.collect::<Result<_>>()?))
+    })
 }
 
 /// The command line itself, with its own handling of signals. For a process that does nothing else.

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -42,10 +44,10 @@ def test_reg157_in_numpy_is_the_built_in_model_to_the_bit(scenarios) -> None:
 def test_a_driver_is_scored_sampled_and_mapped_like_the_built_in_ones(scenarios, density) -> None:
     idm = IDM(headway_s=1.2)
     study = lanesweep.study(scenarios=scenarios, models=["FSM", idm], thw="1.2,0.4")
-    assert {row["model"] for row in study.table("results").rows()} == {"FSM", "IDM"}
+    assert {row["model"] for row in study.table("results").to_polars().rows(named=True)} == {"FSM", "IDM"}
     assert "IDM" in str(study)
     sample = lanesweep.sample(density, models=[idm], samples=500, thw=1.2)
-    assert [row["model"] for row in sample.table("estimates").rows()]== ["IDM"] * 3
+    assert [row["model"] for row in sample.table("estimates").to_polars().rows(named=True)]== ["IDM"] * 3
     grid = lanesweep.map("cut-in", models=[idm], x="gap_m=5..25/5", y="other_speed_kmh=40..80/5", **FIXED)
     assert grid.status == "ok"
 
@@ -233,6 +235,152 @@ def test_a_driver_is_its_present_values_and_another_object_with_these_values_is_
     assert outcomes(listed).equals(fixed[1]) and outcomes(Listed([-6.0])).equals(fixed[0])
 
 
+BRAKES_IN_C = """
+#include <stdint.h>
+/* Brakes at parameters[0] once state, the time since the first step, exceeds parameters[1]. */
+void brakes(int64_t lanes, int64_t stride, int64_t step, double dt_s, const float *view, float *state, const float *parameters, float *acceleration)
+{
+    for (int64_t i = 0; i < lanes; i++) {
+        acceleration[i] = state[stride + i] > parameters[1] && view[9 * stride + i] == 0 ? -parameters[0] : 0;
+        state[stride + i] += dt_s;
+    }
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory) -> Path:
+    if shutil.which("cc") is None:
+        pytest.skip("there is no compiler for C")
+    folder = tmp_path_factory.mktemp("c")
+    (folder / "brakes.c").write_text(BRAKES_IN_C)
+    subprocess.run(["cc", "-O2", "-shared", "-fPIC", "-o", folder / "brakes.so", folder / "brakes.c"], check=True)
+    return folder / "brakes.so"
+
+
+class InC(lanesweep.Driver):
+    """Brakes after a second, without `acceleration`."""
+
+    may_accelerate = False
+    state_rows = 2
+
+    def __init__(self, library: Path, decel: float = 4.0) -> None:
+        self.library = str(library)
+        self.parameters = [decel, 1.0]
+
+    @property
+    def compiled(self) -> Any:
+        return ctypes.CDLL(self.library).brakes
+
+
+class InBoth(InC):
+    """The same beside its NumPy form."""
+
+    def start(self, lanes: int, dt_s: float) -> Any:
+        return np.zeros(lanes, np.float32), np.float32(dt_s)
+
+    def acceleration(self, view: lanesweep.View, state: Any) -> Any:
+        passed, dt_s = state
+        brakes = passed[view.lane] > 1.0
+        passed[view.lane] += dt_s
+        return np.where(brakes & ~view.ahead.present, -self.decel(), 0)
+
+    def decel(self) -> Any:
+        return np.float32(self.parameters[0])
+
+
+class InNumPy(InBoth):
+    compiled = None
+
+
+class Different(InBoth):
+    def decel(self) -> Any:
+        return np.float32(self.parameters[0] + 0.5)
+
+
+def test_a_driver_in_c_gives_the_lanes_of_its_numpy_form_everywhere(library, scenarios, density) -> None:
+    from lanesweep import parts
+
+    found = [outcomes(one(library)).drop(columns="model") for one in (InC, InBoth, InNumPy)]
+    assert found[0].equals(found[2]) and found[1].equals(found[2]) and found[0]["collision"].nunique() == 2
+    # More lanes than a batch, of all categories: they end at other steps, and their states move.
+    study = lanesweep.study(scenarios=scenarios, models=[InC(library), InNumPy(library)], thw="paper").table("results").to_pandas()
+    by_model = {name: group.drop(columns="model").reset_index(drop=True) for name, group in study.groupby("model")}
+    assert by_model["InC"].equals(by_model["InNumPy"]) and by_model["InC"]["failures"].max() > 0
+    options = {"samples": 2000, "thw": 0.6}
+    whole = [lanesweep.sample(density, models=[one(library)], **options).table("estimates")["probability"] for one in (InC, InNumPy)]
+    assert np.array_equal(*whole) and 0 < whole[0][0] < 1
+    plan = parts.plan(lanesweep.sample, density, models=[InC(library)], shards=2, **options)
+    joined = parts.join(plan, [parts.run(plan, shard) for shard in range(2)])
+    assert np.array_equal(joined.table("estimates")["probability"], whole[0])
+    limit_states = [lanesweep.LimitState(density, model=one(library), thw=0.6) for one in (InC, InNumPy)]
+    points = limit_states[0].draw(2000, rng=1)
+    assert np.array_equal(*(limit_state(points) for limit_state in limit_states))
+
+
+def test_a_driver_in_c_is_known_by_its_library_and_its_parameters(library, tmp_path) -> None:
+    from lanesweep._driver import fingerprint
+
+    other = tmp_path / "other.so"
+    shutil.copy(library, other)
+    named = InC(library)
+    named.library = str(other)
+    # The path is a value of this driver.
+    assert fingerprint(InC(library)) == fingerprint(InC(library)) != fingerprint(named)
+    assert fingerprint(InC(library, 3.0)) != fingerprint(InC(library))
+    before = fingerprint(named)
+    # A library that is loaded must not be written to.
+    changed = tmp_path / "changed.so"
+    changed.write_bytes(library.read_bytes() + b" ")
+    changed.replace(other)
+    assert fingerprint(named) != before
+
+
+def test_a_compiled_driver_that_differs_from_its_numpy_form_is_refused(library) -> None:
+    with pytest.raises(lanesweep.InputError, match=r"(?s)driver Different, step \d+: `compiled` decides -4 m/s² where `acceleration` decides -4.5"):
+        outcomes(Different(library))
+
+
+@pytest.mark.parametrize(("code", "message"), [(0, "give a function of"), ("text", "give a function of"), (True, "give a function of"), (None, "neither")])
+def test_what_is_no_compiled_driver_is_named(code, message) -> None:
+    driver = lanesweep.Driver()
+    driver.compiled = code
+    with pytest.raises(TypeError, match=f"driver Driver: .*{message}"):
+        outcomes(driver)
+
+
+def test_an_address_is_a_driver_and_a_wrong_acceleration_of_it_an_error() -> None:
+    pointer = ctypes.POINTER(ctypes.c_float)
+    kind = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 3, ctypes.c_double, *[pointer] * 4)
+    answer = [-3.0]
+
+    @kind
+    def constant(lanes, stride, step, dt_s, view, state, parameters, acceleration):  # type: ignore[no-untyped-def]
+        for lane in range(lanes):
+            acceleration[lane] = answer[0]
+
+    class Address(lanesweep.Driver):
+        may_accelerate = False
+        compiled = ctypes.cast(constant, ctypes.c_void_p).value
+
+    assert outcomes(Address()).drop(columns="model").equals(outcomes(Wrong(-3.0)).drop(columns="model"))
+    answer[0] = float("nan")
+    with pytest.raises(lanesweep.InputError, match="driver Address, step 0: its acceleration is NaN"):
+        outcomes(Address())
+
+
+def test_the_compiled_examples_are_those_in_numpy() -> None:
+    pytest.importorskip("numba")
+    sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
+    from compiled_driver import FastIDM, policy
+
+    ours, theirs = outcomes(FastIDM()), outcomes(IDM())
+    assert (ours["collision"] == theirs["collision"]).mean() > 0.99 and np.allclose(ours["min_gap_m"], theirs["min_gap_m"], atol=0.01)
+    in_numpy = policy()
+    in_numpy.compiled = None
+    assert (outcomes(policy())["collision"] == outcomes(in_numpy)["collision"]).mean() > 0.99
+
+
 class Listed(lanesweep.Driver):
     may_accelerate = False
 
@@ -405,9 +553,9 @@ def test_importance_sampling_with_a_driver_moves_a_bar_and_ends(density, monkeyp
     seen: list[tuple[str, int, int]] = []
     monkeypatch.setattr(_run, "progress", lambda: (lambda *bar: seen.append(bar), lambda: None))
     options = {"estimator": "is", "half_width": 0.5, "thw": 0.4}
-    (ours,) = lanesweep.sample(density, models=[Reg157()], **options).table("estimates").rows()
+    (ours,) = lanesweep.sample(density, models=[Reg157()], **options).table("estimates").to_polars().rows(named=True)
     searched, bounded = [done for what, done, _ in seen if what == "searching"], list(seen)
-    (theirs,) = lanesweep.sample(density, models="Reg157", **options).table("estimates").rows()
+    (theirs,) = lanesweep.sample(density, models="Reg157", **options).table("estimates").to_polars().rows(named=True)
     assert ours["low"] < theirs["probability"] < ours["high"]
     assert len(set(searched)) > 2 and all(0 <= done <= total for _, done, total in seen)
     # A driver that never fails would be drawn for two million times.

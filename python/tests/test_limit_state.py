@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import threading
+import time
+
 import lanesweep
 import numpy as np
 import pytest
@@ -13,7 +18,7 @@ def test_the_sign_is_the_verdict_and_the_share_of_failures_is_the_estimate(densi
     values = limit_state(points)
     assert values.shape == (4000,) and np.isfinite(values).all()
     sample = lanesweep.sample(density, models="RSS", criterion="ttc", thw=0.4, samples=4000, backend="cpu")
-    rows = [row for row in sample.table("estimates").rows() if row["criterion"] == "ttc"]
+    rows = [row for row in sample.table("estimates").to_polars().rows(named=True) if row["criterion"] == "ttc"]
     assert (values <= 0).mean() == pytest.approx(rows[0]["probability"], abs=0.03)
     assert np.isfinite(limit_state.log_density(points)).all()
 
@@ -122,3 +127,16 @@ def test_draws_weighted_by_their_own_density_are_the_crude_estimate(density) -> 
     share = (limit_state(points) <= 0).mean()
     itself = limit_state.estimate(points, limit_state.log_density(points))
     assert itself["probability"] == pytest.approx(share) and itself["mean_weight"] == pytest.approx(1)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals")
+@pytest.mark.parametrize("call", ["__call__", "from_standard_normal", "log_density"])
+def test_an_interrupt_ends_millions_of_points_within_seconds(density, call) -> None:
+    limit_state = lanesweep.LimitState(density, thw=1.0)
+    points = np.tile(limit_state.draw(1000, rng=1), (3000, 1))
+    threading.Timer(0.3, lambda: signal.raise_signal(signal.SIGINT)).start()
+    start = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        getattr(limit_state, call)(points)
+    assert time.monotonic() - start < 4
+    assert np.isfinite(limit_state(points[:10])).all()

@@ -7,6 +7,7 @@ import pickle
 import signal
 import time
 import warnings
+from decimal import Decimal
 
 import lanesweep
 import numpy as np
@@ -27,7 +28,7 @@ def test_a_speed_has_its_unit_in_the_name_or_in_the_value_or_is_refused() -> Non
     options = {"category": "cut-in", "models": "FSM"}
     named = {"ego_speed_kmh": [60.0, 90.0], "speed_kmh": [40, 0], "gap": [15, 40], "lateral_speed": 1.0}
     written = {"ego_speed": ["60km/h", "25m/s"], "speed": ["40 km/h", 0], "gap": ["15m", "40"], "lateral_speed": "1m/s"}
-    assert lanesweep.simulate(named, **options).rows() == lanesweep.simulate(written, **options).rows()
+    assert lanesweep.simulate(named, **options).to_polars().rows(named=True) == lanesweep.simulate(written, **options).to_polars().rows(named=True)
     for bare in ([60.0, 90.0], [0, 60], ["60", "90"]):
         with pytest.raises(lanesweep.InputError, match="60 has no unit: as m/s it is 216 km/h, as km/h 16.67 m/s") as raised:
             lanesweep.simulate({"ego_speed": bare, "speed_kmh": 40, "gap": 15, "lateral_speed": 1}, **options)
@@ -44,7 +45,7 @@ def test_a_speed_has_its_unit_in_the_name_or_in_the_value_or_is_refused() -> Non
 
 def test_every_case_has_its_own_id() -> None:
     cases = {"ego_speed_kmh": 90.0, "gap": [15.0, 40.0], "acceleration": -5}
-    assert len(lanesweep.simulate({**cases, "id": ["a", "b"]}, category="lvd", models="FSM").rows()) == 2
+    assert len(lanesweep.simulate({**cases, "id": ["a", "b"]}, category="lvd", models="FSM").to_polars().rows(named=True)) == 2
     for ids in (["a", "a"], [7, 7]):
         with pytest.raises(lanesweep.InputError, match="row 1.*this id belongs to row 0 too|id.*row 0 too"):
             lanesweep.simulate({**cases, "id": ids}, category="lvd", models="FSM")
@@ -60,7 +61,7 @@ def test_every_library_of_tables_gives_the_same_outcomes() -> None:
 
 def test_a_row_is_the_case_that_trace_runs() -> None:
     frame = lanesweep.simulate(CASES, category="cut-in", models="FSM")
-    for row in frame.rows():
+    for row in frame.to_polars().rows(named=True):
         at = row["case"]
         with_unit = {"mps": "{}m/s", "m": "{}m"}
         case = {key.rsplit("_", 1)[0]: with_unit[key.rsplit("_", 1)[1]].format(values[at]) for key, values in CASES.items()}
@@ -69,6 +70,35 @@ def test_a_row_is_the_case_that_trace_runs() -> None:
         assert outcome["collision"] == row["collision"]
         # A trace is in binary64.
         assert row["min_ttc_s"] == pytest.approx(outcome["min_ttc_s"], rel=1e-4)
+
+
+def test_a_case_within_rounding_of_a_limit_is_not_robust_and_the_reference_is_what_trace_says() -> None:
+    # The last is far from any limit.
+    cases = {
+        "ego_speed_mps": [38.69395536938895, 27.421864529919716, 33.6767980294175, 29.00674810658949, 30.0],
+        "speed_mps": [24.483329487285424, 15.197090112295333, 19.587822472628055, 17.119653931908772, 20.0],
+        "gap": [30.462145330837288, 24.120127121291684, 58.47113429192097, 46.32344642788733, 40.0],
+        "lateral_speed": [1.692366964456078, 1.0969398616077397, 1.2827202148940062, 1.87297914513876, 1.0],
+    }
+    ours, reference = (lanesweep.simulate(cases, category="cut-in", models=["FSM", "CCHDM"], reference=of) for of in (False, True))
+    differs = np.any([ours[name] != reference[name] for name in ("collision", "ttc", "btn")], axis=0)
+    assert differs.tolist() == [True, False, True, False, False, True, False, True, False, False]
+    assert np.array_equal(ours["robust"], ~differs) and reference["robust"].all()
+    for at, model in ((0, "FSM"), (2, "CCHDM")):
+        case = {name.removesuffix("_mps"): f"{values[at]!r}{'m' if name == 'gap' else 'm/s'}" for name, values in cases.items()}
+        traced = lanesweep.trace(category="cut-in", models=model, **case).table("lanes")
+        for name in ("collision", "ttc", "btn", "min_ttc_s", "min_gap_m", "end_s"):
+            assert traced[name][0] == reference[name][2 * at + (model == "CCHDM")], name
+    rng = np.random.default_rng(1)
+    ranges = {"ego_speed_mps": (15, 40), "speed_mps": (10, 35), "gap": (2, 80), "lateral_speed": (0.3, 2.5)}
+    many = {name: rng.uniform(*ends, 5000) for name, ends in ranges.items()}
+    ours, reference = (lanesweep.simulate(many, category="cut-in", reference=of) for of in (False, True))
+    differs = np.any([ours[name] != reference[name] for name in ("collision", "ttc", "btn")], axis=0)
+    assert np.array_equal(ours["robust"], ~differs)
+    with pytest.raises(lanesweep.UsageError, match="reference"):
+        lanesweep.simulate(CASES, category="cut-in", reference=True, backend="gpu")
+    with pytest.raises(lanesweep.UsageError, match="Reg157-numpy"):
+        lanesweep.simulate(CASES, category="cut-in", reference=True, models=[lanesweep.drivers.Reg157()])
 
 
 def test_headways_for_all_cases_and_mixed_categories_keep_the_order() -> None:
@@ -80,7 +110,7 @@ def test_headways_for_all_cases_and_mixed_categories_keep_the_order() -> None:
         "acceleration": [-6.0, None, -6.0],
     }
     frame = lanesweep.simulate(pd.DataFrame(table), thw=[1.2, "0.4"], models=["RSS", "FSM"])
-    rows = [(row["case"], row["headway"], row["model"]) for row in frame.rows()]
+    rows = [(row["case"], row["headway"], row["model"]) for row in frame.to_polars().rows(named=True)]
     assert rows == [(case, thw, model) for case in range(3) for thw in ("1.2s", "0.4s") for model in ("RSS", "FSM")]
     assert frame.units["min_ttc_s"] == "s" and "collision" in frame.descriptions["collision"]
 
@@ -136,15 +166,33 @@ def test_other_columns_ids_and_the_index_are_repeated_for_every_lane_of_their_ca
     pd.testing.assert_frame_equal(found[list(outcomes)], outcomes)
 
 
-def test_a_frame_has_a_shape_rows_several_columns_and_a_pickle() -> None:
+def test_values_of_other_types_are_cast_or_repeated_or_refused_by_column_and_type() -> None:
+    expected = lanesweep.simulate(CASES, category="cut-in", models="FSM").to_pandas()
+    table = pa.table(CASES)
+    gaps, at = table["gap_m"].to_pylist(), table.schema.get_field_index("gap_m")
+    for kind in (pa.decimal128(8, 3), pa.float16(), pa.dictionary(pa.int8(), pa.float64())):
+        values = [Decimal(str(gap)) for gap in gaps] if pa.types.is_decimal(kind) else np.array(gaps, np.float16) if kind == pa.float16() else gaps
+        array = pa.array(gaps).dictionary_encode() if pa.types.is_dictionary(kind) else pa.array(values, kind)
+        given = table.set_column(at, "gap_m", array)
+        pd.testing.assert_frame_equal(lanesweep.simulate(given, category="cut-in", models="FSM").to_pandas(), expected)
+    with pytest.raises(lanesweep.InputError, match=r"column `gap_m`: holds values of the type Duration"):
+        lanesweep.simulate(table.set_column(at, "gap_m", pa.array([1, 2, 3], pa.duration("s"))), category="cut-in")
+    times = pd.to_datetime(["2026-01-01", None, "2026-01-03"])
+    own = {"time": times, "kind": pd.Categorical([3, 1, 3]), "list": [[1, 2], [], [3]]}
+    found = lanesweep.simulate(pd.DataFrame(CASES).assign(**own), category="cut-in", models=["FSM", "RSS"])
+    shown = found.to_pandas()
+    assert (shown["time"][::2].reset_index(drop=True).dropna() == times.dropna()).all() and "Timestamp" in found._repr_html_()
+    assert shown["kind"].tolist() == [3, 3, 1, 1, 3, 3] and found.to_polars()["list"].to_list()[:2] == [[1, 2], [1, 2]]
+
+
+def test_a_frame_has_a_shape_columns_and_a_pickle() -> None:
     frame = lanesweep.simulate(CASES, category="cut-in", models=["FSM", "RSS"])
-    assert frame.shape == (6, len(frame.columns)) and [row["case"] for row in frame] == [0, 0, 1, 1, 2, 2]
-    some = frame[["model", "min_gap_m"]]
-    assert some.columns == ["model", "min_gap_m"] and some.units == {"min_gap_m": "m"} and some.shape == (6, 2)
+    assert frame.shape == (6, len(frame.columns)) and list(frame["case"]) == [0, 0, 1, 1, 2, 2]
+    assert list(frame.to_numpy()) == frame.columns and (frame["model"] == "FSM").sum() == 3
     copy = pickle.loads(pickle.dumps(frame))
-    assert copy.rows() == frame.rows() and copy.units == frame.units and copy.descriptions == frame.descriptions
+    assert copy.to_polars().rows(named=True) == frame.to_polars().rows(named=True) and copy.units == frame.units and copy.descriptions == frame.descriptions
     with pytest.raises(KeyError, match="no column `gap`"):
-        frame[["model", "gap"]]
+        frame["gap"]
 
 
 def test_an_index_that_only_counts_is_no_column_and_missing_values_are_not_given() -> None:
@@ -217,7 +265,7 @@ def test_infinity_stays_infinity_and_null_is_no_value() -> None:
         "lateral_speed_mps": rng.uniform(0.3, 2.5, 4000),
     }
     frame = lanesweep.simulate(table, category="cut-in")
-    for found in (frame.to_pandas(), frame.to_polars().to_pandas(), frame.to_arrow().to_pandas()):
+    for found in (frame.to_pandas(), frame.to_polars().to_pandas(), pa.table(frame).to_pandas()):
         assert found[["min_ttc_s", "max_btn", "min_gap_m"]].notna().all().all()
         btn, collision = found["btn"].astype(bool), found["collision"].astype(bool)
         assert (btn == (found["max_btn"] > 0.8)).all() and np.isinf(found.loc[collision, "max_btn"]).any()

@@ -6,12 +6,14 @@ import importlib.util
 import json
 import logging
 import os
+import pickle
 import re
 import signal
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import lanesweep
 import numpy as np
@@ -19,7 +21,6 @@ import pandas as pd
 import polars as pl
 import pyarrow as pa
 import pytest
-from lanesweep._result import _read_csv
 
 
 def test_the_functions_are_those_of_the_program() -> None:
@@ -101,6 +102,65 @@ def test_a_result_has_tables_figures_and_a_page(scenarios) -> None:
     assert folder.is_dir()
     del result
     assert not folder.exists()
+
+
+CASE = {"category": "cut-in", "ego_speed": "108km/h", "speed": "40km/h", "gap": 25, "lateral_speed": 1}
+
+
+def test_every_table_of_every_verb_opens_with_one_schema_whatever_its_values(scenarios, density, tmp_path) -> None:
+    table = tmp_path / "cases.csv"
+    table.write_text("category,ego_speed_kmh,speed_kmh,gap,lateral_speed\ncut-in,60,40,15,1\ncut-in,90,40,5,1\n")
+    grid = {"x": "deceleration_mps2=2,4", "set": {"thw_s": 1.2}, "models": "FSM"}
+    calls = {
+        "check": [lambda: lanesweep.check(**CASE), lambda: lanesweep.check(**{**CASE, "gap": 400, "speed": "108km/h"})],
+        "rows": [lambda: lanesweep.check(table)],
+        "trace": [lambda: lanesweep.trace(**CASE), lambda: lanesweep.trace(**{**CASE, "gap": 400, "speed": "108km/h"})],
+        # Without and with failures, without and with intervals, of some categories.
+        "study": [lambda: lanesweep.study(scenarios=scenarios), lambda: lanesweep.study(scenarios=scenarios, models="FSM", thw=9, categories="cut-in")],
+        "sample": [lambda: lanesweep.sample(density, samples=10, thw=9, models="FSM"), lambda: lanesweep.sample(density, samples=3000, thw=0.4)],
+        "map": [lambda: lanesweep.map("lvd", y="ego_speed_kmh=60,90", **grid), lambda: lanesweep.map("lvd", y="ego_speed_kmh=60", **grid)],
+    }
+    for verb, made in calls.items():
+        schemas: dict[str, Any] = {}
+        results = [one() for one in made]
+        assert results[0].tables, verb
+        for result in results:
+            for name in result.tables:
+                frame = result.table(name)
+                arrow = pa.table(frame)
+                assert schemas.setdefault(name, arrow.schema).equals(arrow.schema, check_metadata=True), (verb, name)
+                assert arrow.num_rows == len(frame) == len(frame.to_pandas()) == len(frame.to_polars())
+                numbers = [field.name for field in arrow.schema if pa.types.is_floating(field.type) or pa.types.is_integer(field.type)]
+                assert set(frame.units) == set(numbers), (verb, name)
+                texts = [column.to_pylist() for column in arrow.columns if pa.types.is_string(column.type)]
+                assert not any(str(text).startswith(("{", "[")) for column in texts for text in column), (verb, name)
+                shown = repr(frame) + frame._repr_html_()
+                assert all(name in shown for name in frame.columns[:1])
+    best = lanesweep.study(scenarios=scenarios, models="FSM", thw=0.6).table("best")
+    assert "interval" in best.descriptions["f1_low"] and "f1" not in best.descriptions and best.units["failing_scenarios"] == "1"
+    drivers = lanesweep.check(**{**CASE, "gap": 400, "speed": "108km/h"}).table("profiles")
+    assert np.isinf(drivers["min_ttc_s"]).any() and np.isinf(lanesweep.trace(**CASE, models="FSM").table("lanes")["max_drac_mps2"]).all()
+
+
+def test_a_row_of_a_frame_is_a_case_of_check_and_trace() -> None:
+    frame = pl.DataFrame({"category": "cut-in", "ego_speed_kmh": [108.0, 60.0], "speed_kmh": 40.0, "gap_m": [25.0, 15.0], "lateral_speed_mps": 1.0, "length": None})
+    expected = [lanesweep.check(**CASE), lanesweep.trace(**CASE, models="FSM")]
+    for row in (frame.row(0, named=True), frame.to_pandas().iloc[0]):
+        found = [lanesweep.check(row), lanesweep.trace(table=row, models="FSM")]
+        for ours, theirs, name in zip(found, expected, ("profiles", "lanes"), strict=True):
+            assert ours.status == theirs.status and ours.table(name)["min_gap_m"].tolist() == theirs.table(name)["min_gap_m"].tolist()
+    for table in (frame, frame.to_pandas()):
+        assert len(lanesweep.check(table.drop("length", axis=1) if table is not frame else table.drop("length")).table("cases")) == 2
+        assert lanesweep.check(frame.drop("length"), row=2).status == "preventable"
+
+
+def test_a_figure_is_saved_as_what_its_name_says(scenarios, tmp_path) -> None:
+    pytest.importorskip("matplotlib")
+    figure = lanesweep.study(scenarios=scenarios, thw="1.2,0.6", backend="cpu").figure("f1-cut-in")
+    assert figure.save(tmp_path / "f.png").read_bytes().startswith(b"\x89PNG")
+    assert "<svg" in figure.save(tmp_path / "f.svg").read_text()
+    with pytest.raises(ValueError, match="xyz"):
+        figure.save(tmp_path / "f.xyz")
 
 
 def test_a_figure_outlives_its_result(scenarios) -> None:
@@ -209,9 +269,9 @@ def test_a_table_in_memory_is_a_scenario_file(tmp_path) -> None:
     table = pd.DataFrame(rows)
     table.to_csv(tmp_path / "scenarios.csv", index=False)
     options = {"categories": "cut-in", "thw": [0.6], "backend": "cpu"}
-    expected = lanesweep.study(scenarios=tmp_path / "scenarios.csv", **options).table("results").rows()
+    expected = lanesweep.study(scenarios=tmp_path / "scenarios.csv", **options).table("results").to_polars().rows(named=True)
     for given in (table, pl.DataFrame(rows), pa.Table.from_pandas(table)):
-        assert lanesweep.study(scenarios=given, **options).table("results").rows() == expected
+        assert lanesweep.study(scenarios=given, **options).table("results").to_polars().rows(named=True) == expected
 
 
 def test_a_star_import_leaves_the_names_of_python_alone() -> None:
@@ -243,9 +303,17 @@ def test_infinite_numbers_and_empty_tables_of_verbs_are_what_they_are(density, t
     # A ratio without a failure has no value, and an interval around no failure is infinitely wide.
     rare = lanesweep.sample(density, models="FSM", thw=2.0, samples=100).table("estimates").to_pandas()
     assert (rare["failures"] == 0).any() and np.isinf(rare.loc[rare["failures"] == 0, "relative_half_width"]).all()
-    (tmp_path / "empty.csv").write_text("model,probability\n")
-    empty = _read_csv(tmp_path / "empty.csv")
-    assert len(empty) == 0 and empty.columns == ["model", "probability"] and len(empty.to_pandas()) == 0
+
+
+def test_a_density_outlives_its_fit() -> None:
+    options = {"synth_recordings": 6, "categories": "cut-in", "parameterizations": 2}
+    density = lanesweep.fit(**options).densities["cut-in-2"]
+    assert lanesweep.sample(density, samples=100, thw=1.2, models="FSM").status == "ok"
+    limit_state = lanesweep.LimitState(lanesweep.fit(**options), thw=1.0)
+    assert pickle.loads(pickle.dumps(limit_state)).parameters == limit_state.parameters
+    folder = density.parent
+    del density
+    assert not folder.exists()
 
 
 def test_a_single_density_is_among_the_densities_of_its_fit(density, tmp_path) -> None:
@@ -284,9 +352,9 @@ def test_values_keep_their_meaning_and_names_their_letters(density, scenarios, t
     planned = lanesweep.sample(odd, samples=200, thw=1.2, plan_only=True, out=tmp_path / "plan", **tiny)
     from_plan = lanesweep.sample(plan=planned, out=tmp_path / "run", backend="cpu")
     whole = lanesweep.sample(odd, samples=np.int64(200), thw=np.float32(1.2), **tiny)
-    assert from_plan.table("estimates").rows() == whole.table("estimates").rows()
+    assert from_plan.table("estimates").to_polars().rows(named=True) == whole.table("estimates").to_polars().rows(named=True)
     headways = [np.array([0.6], dtype="float32"), pd.Series([0.6], dtype="Float32"), {0.6}, (0.6,), np.array(0.6)]
-    studies = [lanesweep.study(scenarios=scenarios, thw=thw, **tiny).table("results").rows() for thw in headways]
+    studies = [lanesweep.study(scenarios=scenarios, thw=thw, **tiny).table("results").to_polars().rows(named=True) for thw in headways]
     assert all(study == studies[0] for study in studies)
     panels = {"ego_speed_kmh": {90, 60, 120}}
     options = {"x": "gap_m=5..9/2", "y": "other_speed_kmh=30,40", "set": pd.Series({"lateral_speed_mps": 1.0})}

@@ -17,9 +17,9 @@ FUNCTIONS = ["study", "tracks", "mine", "fit", "sample", "map", "check", "trace"
 #: Types of arguments, by their names.
 NAMES = {
     "categories": "Categories", "category": "Category", "compare": "Keys | bool", "config": "Config", "criterion": "Criterion",
-    "device": "str | Int", "external": "Paths | Mapping[str, Any]", "lane": "Values", "models": "Models",
+    "device": "str | Int", "external": "Paths | Mapping[str, Any]", "file": "Path | Table | Mapping[str, Any]", "lane": "Values", "models": "Models",
     "panel": "Values", "parameterizations": "Keys", "paths": "Paths", "profiles": "Paths", "proposal": "Path",
-    "scenarios": "Path | Table", "set": "Values", "thw": "Headways",
+    "scenarios": "Path | Table", "set": "Values", "table": "Path | Table | Mapping[str, Any]", "thw": "Headways",
 }  # fmt: skip
 #: Types of arguments, by the names of their values on the command line.
 VALUES = {

@@ -147,7 +147,8 @@ impl Check {
         }
         // If input was skipped the answer is incomplete.
         let exit = if request.incomplete { Exit::Incomplete } else { Exit::from(judgements[0].verdict()) };
-        self.format.output(exit, || if self.full { sheet.text() } else { sheet.brief() }, || sheet.json())
+        let text = || if self.full { sheet.text() } else { sheet.brief() };
+        Ok(self.format.output(exit, text, || sheet.json())?.with_tables(|| sheet.tables()))
     }
 
     /// The table to be judged with all rows.

@@ -103,7 +103,8 @@ impl CheckedTable<'_> {
             answers.save(path)?;
         }
         let exit = if is_complete { Exit::from(answers.worst()) } else { Exit::Incomplete };
-        format.output(exit, || answers.text(console::width()), || answers.json())
+        let output = format.output(exit, || answers.text(console::width()), || answers.json())?;
+        Ok(output.with_tables(|| vec![("cases".to_owned(), answers.all())]))
     }
 
     /// Runs the lanes of some rows.

@@ -41,7 +41,7 @@ impl FormatFlag {
         json: impl FnOnce() -> Result<String>,
     ) -> Result<Output> {
         if console::is_captured() {
-            return Ok(Output { exit, text: text(), document: json()? });
+            return Ok(Output { text: text(), document: json()?, ..exit.into() });
         }
         match self.format {
             Format::Text => console::print(&text())?,
@@ -77,7 +77,7 @@ impl FormatFlag {
         let exit = if is_incomplete { Exit::Incomplete } else { Exit::Ok };
         let printed = self.output(exit, answer, || report.json(&files))?;
         tracing::info!("{} files written; start with {}", files.files.len() + 1, page.display());
-        Ok(printed)
+        Ok(printed.with_tables(|| files.tables))
     }
 
     /// The answer about a plan that `--plan-only` wrote.

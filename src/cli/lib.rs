@@ -46,6 +46,7 @@ use console::Verbosity;
 
 use lanesweep_support::error::{Notation, write_options_as};
 use lanesweep_support::input_file::guarded;
+use lanesweep_support::run_folder::NamedTable;
 use lanesweep_support::{Error, Result, option};
 
 #[derive(Parser)]
@@ -105,7 +106,7 @@ enum Verb {
 }
 
 /// How a verb ended. Texts are empty where the verb has printed its answer itself.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Output {
     /// The exit code; never one of an error.
     pub exit: Exit,
@@ -113,11 +114,20 @@ pub struct Output {
     pub text: String,
     /// Its numbers as one JSON document.
     pub document: String,
+    /// Its tables, for a program that calls the verb as a function.
+    pub tables: Vec<NamedTable>,
+}
+
+impl Output {
+    /// With tables, if a program calls the verb.
+    fn with_tables(self, tables: impl FnOnce() -> Vec<NamedTable>) -> Output {
+        if console::is_captured() { Output { tables: tables(), ..self } } else { self }
+    }
 }
 
 impl From<Exit> for Output {
     fn from(exit: Exit) -> Output {
-        Output { exit, text: String::new(), document: String::new() }
+        Output { exit, text: String::new(), document: String::new(), tables: Vec::new() }
     }
 }
 

@@ -118,7 +118,7 @@ impl Map {
         let (simulations, seconds) = (count(report.simulations()), value(report.host.seconds));
         tracing::info!("{simulations} simulations in {seconds} s on {}", report.host.backend);
         tracing::info!("{} files written to {}", written.files.len() + 1, self.out.display());
-        Ok(output)
+        Ok(output.with_tables(|| written.tables))
     }
 
     /// The preset's profile, unless another is set.

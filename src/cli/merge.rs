@@ -67,7 +67,8 @@ impl Merge {
                 table.into_iter().for_each(|table| results.join(table));
                 let report = SampleReport::of_sample(&sample, &result, host)?;
                 let files = report.write(results, &sample, &result)?;
-                self.format.output_in(&self.folder, Exit::Ok, || report.text(), || report.json(&files))
+                let output = self.format.output_in(&self.folder, Exit::Ok, || report.text(), || report.json(&files))?;
+                Ok(output.with_tables(|| files.tables))
             }
         }
     }

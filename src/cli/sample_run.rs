@@ -191,7 +191,7 @@ impl Sample {
         let files = report.write(results, sample, &result)?;
         let output = self.format.output_in(&self.out, Exit::Ok, || report.text(), || report.json(&files))?;
         run.close()?;
-        Ok(output)
+        Ok(output.with_tables(|| files.tables))
     }
 }
 

@@ -93,7 +93,7 @@ impl Simulate {
         if configured.verbosity != Verbosity::Quiet {
             console::say(&report.text());
         }
-        Ok(output)
+        Ok(output.with_tables(|| report.tables()))
     }
 
     /// The lanes, their OpenSCENARIO scenarios, and whether others of the file were skipped.

@@ -189,6 +189,18 @@ fn assumptions_table(profile: &Profile) -> Table {
     table.build().captioned(format!("Constants of {}", profile.name))
 }
 
+/// Every constant and option of a profile, as texts.
+pub(super) fn assumptions(profile: &Profile) -> Table {
+    let all = profile.assumptions();
+    Table::of(&all)
+        .column("key", |of| of.key.as_str())
+        .column("value", |of| plain(&of.value))
+        .column("unit", |of| of.unit.to_owned())
+        .column("meaning", |of| of.meaning.as_deref())
+        .column("source", |of| of.source.as_deref())
+        .build()
+}
+
 fn source(of: &Assumption) -> &str {
     of.source.as_deref().unwrap_or("no source recorded: the profile's own value")
 }

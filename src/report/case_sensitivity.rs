@@ -1,12 +1,9 @@
 //! Which driver decides: the verdict of a sheet by rule, reading and profile.
 
-use serde::Serialize;
-
 use super::case_sheet::CaseSheet;
 use super::html::Section;
-use super::records::record;
 use super::tables::{WIDTH, wrap};
-use lanesweep_run::check::{DriverRule, RuleVerdicts, Verdict};
+use lanesweep_run::check::{DriverRule, RuleVerdicts};
 use lanesweep_support::table::Table;
 
 /// What the columns of the rules show.
@@ -72,19 +69,15 @@ impl CaseSheet<'_> {
         Some(Section::new("rule", "Which driver decides").intro(format!("{intro}{RULES}.")).tables([table]))
     }
 
-    /// The same as records: a row per profile, reading and rule.
-    pub(super) fn by_rule_records(&self) -> Vec<impl Serialize> {
+    /// The same with a row per profile, reading and rule.
+    pub(super) fn rule_rows(&self) -> Table {
         let in_force = self.first().verdict();
-        let all = self.rules().flat_map(|(profile, row)| row.verdicts.iter().map(move |of| (profile, row.reading, of)));
-        let record = |(profile, reading, (rule, verdict)): (&str, Option<&'static str>, &(DriverRule, Verdict))| {
-            record! {
-                differs: *verdict != in_force,
-                profile: profile.to_owned(),
-                reading: reading,
-                rule: rule.label(),
-                verdict: verdict.label(),
-            }
-        };
-        all.map(record).collect()
+        Table::of(self.rules().flat_map(|(profile, row)| row.verdicts.iter().map(move |of| (profile, row.reading, of))))
+            .column("profile", |(profile, ..)| profile)
+            .column("reading", |(_, reading, _)| reading)
+            .column("rule", |(.., (rule, _))| rule.label())
+            .column("verdict", |(.., (_, verdict))| verdict.label())
+            .column("differs", |(.., (_, verdict))| *verdict != in_force)
+            .build()
     }
 }

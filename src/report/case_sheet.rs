@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::case_evidence::assumptions;
 use super::case_identity::{CaseIdentity, NOT_CONSIDERED, profile_sha256};
 use super::html::{Page, PageFigure, Section};
-use super::lanes::outcome_record;
+use super::lanes::{outcome_record, with_outcomes};
 use super::records::{self, PROGRAM, record};
 use super::tables::{WIDTH, wrap};
 use super::trace::{TraceFigure, TracePanels, TraceSeries};
@@ -17,6 +18,7 @@ use lanesweep_model::scenario::{CaseQuantity, KMH, NUMBERS};
 use lanesweep_run::check::{Boundary, Change, Judged, Judgement, Reading, RunEnd, Subject, Verdict};
 use lanesweep_run::grid::VARIED;
 use lanesweep_support::readable::value;
+use lanesweep_support::run_folder::NamedTable;
 use lanesweep_support::table::{Column, NumberText, Table, json_number};
 use lanesweep_support::{Result, option};
 
@@ -220,6 +222,23 @@ impl CaseSheet<'_> {
         )
     }
 
+    /// A row per driver and profile, per constant, and per rule.
+    pub fn tables(&self) -> Vec<NamedTable> {
+        let drivers = self.judgements.iter().flat_map(|of| of.models.iter().map(move |judged| (of, judged)));
+        let drivers: Vec<_> = drivers.collect();
+        let profiles = Table::of(drivers.iter().copied())
+            .column("profile", |(of, _)| of.profile.as_str())
+            .column("verdict", |(of, _)| of.verdict().label())
+            .column("model", |(_, judged)| judged.trace.model.name())
+            .column("braking_s", |(_, judged)| judged.braking_s())
+            .column("changes_with", |(_, judged)| judged.flips.join(", "))
+            .column("is_contact_like", |(_, judged)| judged.touches);
+        let profiles = with_outcomes(profiles.build(), drivers.iter().map(|(_, judged)| &judged.trace));
+        let tables =
+            [("profiles", profiles), ("assumptions", assumptions(&self.profiles[0])), ("by_rule", self.rule_rows())];
+        tables.map(|(name, table)| (name.to_owned(), table)).into()
+    }
+
     /// The sheet as one document.
     ///
     /// # Errors
@@ -228,7 +247,7 @@ impl CaseSheet<'_> {
         records::document(&record! {
             answer: self.answer(),
             assumptions: records::sorted(&self.profiles[0].assumptions()),
-            by_rule: self.by_rule_records(),
+            by_rule: self.rule_rows().records(),
             case: self.case_numbers(),
             category: self.subject.category().key(),
             cautions: self.cautions(),

@@ -267,7 +267,7 @@ impl CaseAnswers {
     }
 
     /// All columns of all rows.
-    fn all(&self) -> Table {
+    pub fn all(&self) -> Table {
         let mut table = self.columns(self.cases.iter().collect());
         if !self.is_nominal {
             table = table

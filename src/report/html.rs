@@ -39,7 +39,7 @@ impl PageFigure {
     /// figures/NAME.txt.
     pub(super) fn add(results: &mut Results, name: &str, figure: &Figure, is_plain: bool) -> Result<PageFigure> {
         let [numbers, file] = [format!("{TABLES}{name}.csv"), format!("{FIGURES}{name}.svg")];
-        results.add(&numbers, figure.csv().as_bytes())?;
+        results.add_table(&numbers, figure.numbers())?;
         if !is_plain {
             return PageFigure::add_svg(results, name, &figure.svg(), &numbers);
         }

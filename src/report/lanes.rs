@@ -5,14 +5,14 @@ use std::path::Path;
 use serde_json::{Map, Value};
 
 use crate::records::{at_contact, smallest_gap_m, time_s};
-use lanesweep_engine::{Chunk, Headway, LanePlan, Outcome};
+use lanesweep_engine::{Chunk, Headway, LanePlan, Outcome, Trace};
 use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::ModelId;
 use lanesweep_run::sampling::{FailingLane, Origin, Sample};
 use lanesweep_run::study::{Study, robust_lanes};
 use lanesweep_stats::density::DensityModel;
 use lanesweep_support::files::make_folder_of;
-use lanesweep_support::table::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter, json_value};
+use lanesweep_support::table::{Cell, Column, ColumnKind, Table, TableFormat, TableMetadata, TableWriter, json_value};
 use lanesweep_support::{Error, Result, option};
 
 /// A table for the lanes of a study; see [`write_study_chunk`]. It is written chunk by chunk, so that memory does not
@@ -137,30 +137,46 @@ pub(super) fn outcome_cells(outcome: &Outcome<f64>, dt_s: f64) -> [Cell<'static>
     std::array::from_fn(|at| OUTCOME[at].4(outcome, dt_s))
 }
 
+/// A table with a row per trace, and how each ended, in binary64.
+pub(crate) fn with_outcomes<'t>(mut table: Table, traces: impl IntoIterator<Item = &'t Trace>) -> Table {
+    table.columns.extend(outcome_columns(ColumnKind::Binary64));
+    for (row, trace) in table.rows.iter_mut().zip(traces) {
+        row.extend(outcome_cells(&trace.outcome, trace.dt_s).into_iter());
+    }
+    table
+}
+
 /// How a lane ended, for a JSON document, in binary64.
 pub(crate) fn outcome_record(outcome: &Outcome<f64>, dt_s: f64) -> Map<String, Value> {
     let value = |value: OutcomeValue| json_value(ColumnKind::Binary64, &value(outcome, dt_s));
     OUTCOME.iter().map(|&(name, .., of)| (name.to_owned(), value(of))).collect()
 }
 
-/// The columns of [concrete cases](lanesweep_run::cases), in their order.
+/// The columns of [concrete cases](lanesweep_run::cases), in their order; `value` as in [`columns`].
 #[rustfmt::skip] // a table: one line per column
-pub fn case_columns() -> Vec<Column> {
+pub fn case_columns(value: ColumnKind) -> Vec<Column> {
     let c = Column::new;
     let mut columns = vec![
         c("case", ColumnKind::Whole, "1", "Row of the case, from 0."),
         c("headway", ColumnKind::Name, "", "Initial time headway or gap with its unit; null where each case has its own."),
         c("model", ColumnKind::Name, "", "Driver model."),
     ];
-    columns.extend(outcome_columns(ColumnKind::Binary32));
+    columns.extend(outcome_columns(value));
+    columns.push(c("robust", ColumnKind::Flag, "", "Binary64, the arithmetic of `check` and `trace`, gives the same verdicts; null for drivers of one's own."));
     columns
 }
 
 /// A row of [`case_columns`].
-pub fn case_row<'a>(case: u64, headway: Headway, model: &'a str, outcome: &Outcome<f64>, dt_s: f64) -> Vec<Cell<'a>> {
+pub fn case_row<'a>(
+    (case, headway, model): (u64, Headway, &'a str),
+    outcome: &Outcome<f64>,
+    is_robust: Option<bool>,
+    dt_s: f64,
+) -> Vec<Cell<'a>> {
     let headway = (headway != Headway::Observed).then(|| headway.to_string());
     let mut row = vec![Cell::Whole(case as i64), headway.map_or(Cell::Null, Cell::text), Cell::text(model)];
     row.extend(outcome_cells(outcome, dt_s));
+    row.push(is_robust.map_or(Cell::Null, Cell::Flag));
     row
 }
 

@@ -11,6 +11,7 @@ mod case_sensitivity;
 mod case_sentences;
 pub mod case_sheet;
 pub mod case_table;
+pub mod column_words;
 pub mod density;
 mod dots;
 pub mod host;

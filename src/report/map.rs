@@ -54,7 +54,7 @@ impl MapReport {
             }
         }
         results.add("report.html", self.html(figures).as_bytes())?;
-        results.add_with("cells.csv", |out| self.write_cells(out))?;
+        results.add_table("cells.csv", self.cells())?;
         publish(results, |files| self.json(files))
     }
 

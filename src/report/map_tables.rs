@@ -1,7 +1,5 @@
 //! The tables of a `map` run: cells by outcome for the terminal, every cell as CSV.
 
-use std::io::{self, Write};
-
 use super::case_sentences::CLAUSE_OF_LEADERS;
 use super::map::MapReport;
 use lanesweep_model::criterion::Criterion;
@@ -145,36 +143,39 @@ impl MapReport {
     }
 
     /// One row per cell and model.
-    pub(super) fn write_cells(&self, out: &mut dyn Write) -> io::Result<()> {
-        let mut out = io::BufWriter::new(out);
-        let is_robust = self.is_robust();
-        let columns = "initial_gap_m,model,collision,ttc,btn,capped,failed,conflict,outcome,drives_through";
+    pub(super) fn cells(&self) -> Table {
         // All grids of a run have the same parameters.
         let grid = self.grids.first().map(|mapped| mapped.plan.grid.values(0)).unwrap_or_default();
         let keys: Vec<&str> = grid.iter().map(|(parameter, _)| parameter.key).collect();
-        writeln!(out, "map,{},{columns}{}", keys.join(","), if is_robust { ",undecided" } else { "" })?;
-        for MappedGrid { plan, map, .. } in &self.grids {
-            let profile = &plan.parts[0].plan.profile;
-            for cell in 0..map.cell_count() {
-                let drives_through = u8::from(map.drives_through(cell));
-                let values: Vec<String> = plan.grid.values(cell).iter().map(|(_, value)| value.to_string()).collect();
-                let place = format!("{},{}", plan.grid.name, values.join(","));
-                for (at, &model) in map.models.iter().enumerate() {
-                    let verdicts = map.verdicts(at, cell);
-                    let [collision, ttc, btn] = Criterion::ALL.map(|c| u8::from(verdicts.failed(c)));
-                    let (capped, failed) = (u8::from(verdicts.capped()), u8::from(verdicts.failed(self.criterion)));
-                    let gap_m = plan.grid.gap_m(cell, model, profile);
-                    let conflict = u8::from(map.is_conflict(at, cell));
-                    let outcome = map.outcome(at, cell, self.criterion).label();
-                    write!(out, "{place},{gap_m},{},{collision},{ttc},{btn},{capped},{failed}", model.name())?;
-                    write!(out, ",{conflict},{outcome},{drives_through}")?;
-                    if is_robust {
-                        write!(out, ",{}", u8::from(map.is_undecided(at, cell, self.criterion)))?;
-                    }
-                    writeln!(out)?;
-                }
-            }
-        }
-        out.flush()
+        let rows = self.grids.iter().flat_map(|of| {
+            let models = 0..of.map.models.len();
+            (0..of.map.cell_count()).flat_map(move |cell| models.clone().map(move |at| (of, cell, at)))
+        });
+        type Row<'a> = (&'a MappedGrid, usize, usize);
+        let failed = |(of, cell, at): Row<'_>, criterion| of.map.verdicts(at, cell).failed(criterion);
+        let gap_m = |(MappedGrid { plan, map, .. }, cell, at): Row<'_>| {
+            plan.grid.gap_m(cell, map.models[at], &plan.parts[0].plan.profile)
+        };
+        Table::of(rows)
+            .column("map", |(of, ..)| of.plan.grid.name.as_str())
+            .columns(0..keys.len(), |key| keys[key].to_owned(), |(of, cell, _), key| of.plan.grid.values(cell)[key].1)
+            .column("initial_gap_m", gap_m)
+            .column("model", |(of, _, at)| of.map.models[at].name())
+            .columns(
+                [("collision", Criterion::Collision), ("ttc", Criterion::Ttc), ("btn", Criterion::Btn)],
+                |(name, _)| name,
+                |row, (_, of)| failed(row, of),
+            )
+            .column("capped", |(of, cell, at)| of.map.verdicts(at, cell).capped())
+            .column("failed", |row| failed(row, self.criterion))
+            .column("conflict", |(of, cell, at)| of.map.is_conflict(at, cell))
+            .column("outcome", |(of, cell, at)| of.map.outcome(at, cell, self.criterion).label())
+            .column("drives_through", |(of, cell, _)| of.map.drives_through(cell))
+            .columns(
+                self.is_robust().then_some("undecided"),
+                |name| name,
+                |(of, cell, at), _| of.map.is_undecided(at, cell, self.criterion),
+            )
+            .build()
     }
 }

@@ -49,7 +49,10 @@ pub(crate) fn smallest_gap_m(outcome: &Outcome<f64>) -> f64 {
 
 /// Publishes results with their record, which has the names and checksums of the other files; returns these. The page is without
 /// one: it has the times of the run, and equal inputs give equal checksums.
-pub(super) fn publish(results: Results, record: impl FnOnce(&ResultFiles) -> Result<String>) -> Result<ResultFiles> {
+pub(super) fn publish(
+    mut results: Results,
+    record: impl FnOnce(&ResultFiles) -> Result<String>,
+) -> Result<ResultFiles> {
     let mut files = results.files();
     files.files_sha256.remove("report.html");
     results.publish(record(&files)?.as_bytes())?;

@@ -5,7 +5,7 @@ use super::html::PageFigure;
 use super::records::publish;
 use super::sampling::{DensityRecord, DrawRecord, SampleReport};
 use super::sampling_figures::convergence;
-use super::sampling_tables::convergence_csv;
+use super::sampling_tables::convergence_table;
 use lanesweep_engine::Headway;
 use lanesweep_run::sampling::{Sample, SampleResult, proposal_text};
 use lanesweep_support::Result;
@@ -44,7 +44,7 @@ impl SampleReport {
         let (density, mut figures) = (&sample.density, Vec::new());
         if let Some(run) = &result.crude {
             let numbers = format!("{TABLES}convergence.csv");
-            results.add(&numbers, convergence_csv(&run.convergence).as_bytes())?;
+            results.add_table(&numbers, convergence_table(&run.convergence))?;
             let svg = convergence(density, &run.convergence, self.level()).svg();
             figures.push(PageFigure::add_svg(&mut results, "convergence", &svg, &numbers)?);
         }
@@ -55,7 +55,7 @@ impl SampleReport {
         if let Some(figure) = self.headways_figure() {
             figures.insert(0, PageFigure::add(&mut results, "headways", &figure, false)?);
         }
-        results.add("estimates.csv", self.csv().as_bytes())?;
+        results.add_table("estimates.csv", self.estimate_rows())?;
         results.add("report.html", self.html(figures).as_bytes())?;
         publish(results, |files| self.json(files))
     }

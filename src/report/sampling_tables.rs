@@ -13,7 +13,7 @@ use lanesweep_support::table::{NamedValue, Table};
 
 impl SampleReport {
     /// `estimates.csv`.
-    pub(super) fn csv(&self) -> String {
+    pub(super) fn estimate_rows(&self) -> Table {
         let weights: [NamedValue<WeightFigures, f64>; 3] = [
             ("ess_failures", |w| w.effective_failures),
             ("largest_weight_fraction", |w| w.largest_fraction),
@@ -91,12 +91,11 @@ impl SampleReport {
             .column("bandwidth", |row| row.bandwidth.map(BandwidthVerdict::key))
             .column("data", |_| self.density.provenance.data.as_str())
             .build()
-            .csv()
     }
 }
 
 /// `convergence.csv`.
-pub(super) fn convergence_csv(checkpoints: &[Checkpoint]) -> String {
+pub(super) fn convergence_table(checkpoints: &[Checkpoint]) -> Table {
     let rows = checkpoints.iter().flat_map(|of| of.rows.iter().map(move |row| (of.samples, row)));
     Table::of(rows)
         .column("samples", |(samples, _)| samples)
@@ -109,7 +108,6 @@ pub(super) fn convergence_csv(checkpoints: &[Checkpoint]) -> String {
         .column("high_with_data", |(_, row)| row.with_data.and_then(|(ends, _)| known(ends[1])))
         .column("failing_scenarios", |(_, row)| row.with_data.and_then(|(_, scenarios)| known(scenarios)))
         .build()
-        .csv()
 }
 
 /// The id of a scenario that carries a part of P, or its kernel.

@@ -76,8 +76,9 @@ impl<'a> StudyReport<'a> {
     /// [`lanesweep_support::Error::Io`].
     pub fn write(&self, mut results: Results, is_plain: bool) -> Result<ResultFiles> {
         let data = if self.facts().synthetic { "synthetic" } else { "recorded" };
-        results.add("results.csv", tables::result_records(&self.evaluation, data)?.csv().as_bytes())?;
-        let mut table = |name: &str, table: Table| results.add(&format!("{TABLES}{name}.csv"), table.csv().as_bytes());
+        results.add_table("results.csv", tables::result_records(&self.evaluation, data)?)?;
+        results.keep_table("best", best_table(&self.evaluation.best, data));
+        let mut table = |name: &str, table: Table| results.add_table(&format!("{TABLES}{name}.csv"), table);
         table("claims", tables::claim_records(&self.evaluation.claims, data))?;
         if self.facts().categories.iter().any(|of| !of.folds.is_empty()) {
             let folds = self.facts().categories.iter().flat_map(|of| &of.folds);
@@ -225,6 +226,26 @@ impl StudyReport<'_> {
         });
         records.collect()
     }
+}
+
+/// A row per best parameterization.
+fn best_table(best: &[Best], data: &str) -> Table {
+    Table::of(best)
+        .column("category", |of| of.category.key())
+        .column("model", |of| of.model.name())
+        .column("criterion", |_| Criterion::Collision.key())
+        .column("variant", |of| of.score.as_ref().map(|s| s.variant.to_string()))
+        .column("f1", |of| of.score.as_ref().map(|s| s.f1))
+        .column("f1_low", |of| of.score.as_ref().map(|s| s.interval.low))
+        .column("f1_high", |of| of.score.as_ref().map(|s| s.interval.high))
+        .column("missed_collisions", |of| of.score.as_ref().map(|s| s.missed))
+        .column("invented_collisions", |of| of.score.as_ref().map(|s| s.invented))
+        .column("ties_with", |of| of.score.as_ref().map_or(String::new(), |s| s.rivals.join(" ")))
+        .column("data_for_decision", |of| of.data_for_decision)
+        .column("failing_scenarios", |of| of.failing_scenarios)
+        .column("s_failures", |of| of.failures)
+        .column("data", |_| data)
+        .build()
 }
 
 /// A best parameterization; undefined numbers are null.

@@ -18,6 +18,7 @@ use serde::{Deserialize, Serialize};
 use crate::atomic_file::{AtomicFile, Live, StagedFile, clear_stale, folder_of, refuse_link, sync_folder};
 use crate::files::{file_name, make_folder, remove_file, write_inside};
 use crate::lock::FolderLock;
+use crate::table::Table;
 use crate::{Error, Place, Result, input_file};
 
 /// Lists the files of the folder's run.
@@ -134,7 +135,7 @@ impl RunFolder {
         // It existed before the work. If it vanished meanwhile, create it anew to save the result.
         make_folder(&self.dir)?;
         let (staged, sha256, elsewhere) = (Vec::new(), BTreeMap::new(), Vec::new());
-        Ok(Results { folder: self, staged, sha256, elsewhere, named: BTreeSet::new() })
+        Ok(Results { folder: self, staged, sha256, tables: Vec::new(), elsewhere, named: BTreeSet::new() })
     }
 
     /// The list of the former run, or of one that ended during renaming, with the files that exist. A folder that is
@@ -204,13 +205,20 @@ pub struct ResultFiles {
     pub files: Vec<String>,
     /// SHA-256 of each file that this run has written itself, by its name.
     pub files_sha256: BTreeMap<String, String>,
+    /// The tables, by their names without folder and ending.
+    #[serde(skip)]
+    pub tables: Vec<NamedTable>,
 }
+
+/// A table of a result and its name.
+pub type NamedTable = (String, Table);
 
 /// Results of a run under hidden names; dropping them before [`Results::publish`] removes them.
 pub struct Results<'a> {
     folder: &'a RunFolder,
     staged: Vec<(String, StagedFile)>,
     sha256: BTreeMap<String, String>,
+    tables: Vec<NamedTable>,
     elsewhere: Vec<StagedFile>,
     /// Files in this folder whose paths the user gave; they may replace any file.
     named: BTreeSet<String>,
@@ -252,6 +260,22 @@ impl Results<'_> {
         Ok(())
     }
 
+    /// Adds a table as a CSV file.
+    ///
+    /// # Errors
+    /// As [`Results::add`].
+    pub fn add_table(&mut self, name: &str, table: Table) -> Result<()> {
+        self.add(name, table.csv().as_bytes())?;
+        let stem = name.rsplit('/').next().unwrap_or(name).trim_end_matches(".csv");
+        self.keep_table(stem, table);
+        Ok(())
+    }
+
+    /// Adds a table that the record holds, without a file.
+    pub fn keep_table(&mut self, name: &str, table: Table) {
+        self.tables.push((name.to_owned(), table));
+    }
+
     /// Adds a complete file of this folder.
     pub fn add_staged(&mut self, file: StagedFile) {
         self.staged.push((file_name(file.target()), file.closed()));
@@ -272,9 +296,10 @@ impl Results<'_> {
         self.staged.iter().map(|(name, _)| name.clone()).collect::<BTreeSet<String>>().into_iter().collect()
     }
 
-    /// All files in the folder, for the record.
-    pub fn files(&self) -> ResultFiles {
-        ResultFiles { files: self.names(), files_sha256: self.sha256.clone() }
+    /// All files in the folder, for the record; takes the tables.
+    pub fn files(&mut self) -> ResultFiles {
+        let tables = std::mem::take(&mut self.tables);
+        ResultFiles { files: self.names(), files_sha256: self.sha256.clone(), tables }
     }
 
     /// Replaces the former run's results by these; the record is renamed last.

@@ -280,6 +280,14 @@ impl<const N: usize> LaneArrays<N> {
         }
     }
 
+    /// Copies one lane of others to place `to`.
+    #[inline]
+    pub(super) fn copy_from<const M: usize>(&mut self, to: usize, lanes: &LaneArrays<M>, k: usize) {
+        for (part, from) in self.parts_mut(true, true, true).into_iter().zip(lanes.parts(true, true, true)) {
+            copy(part, to, from, k);
+        }
+    }
+
     /// Copies one of these lanes to place `to`, where it continues with one of its vehicles. For verdicts only.
     #[inline]
     pub(super) fn set_single(
@@ -476,7 +484,7 @@ trait Rows<const N: usize>: Pod {
 
 /// Copies entry `k` of every row to place `to`.
 #[inline(always)]
-fn copy<const N: usize>(rows: &mut [[u32; N]], to: usize, from: &[[u32; LANES]], k: usize) {
+fn copy<const N: usize, const M: usize>(rows: &mut [[u32; N]], to: usize, from: &[[u32; M]], k: usize) {
     for (row, from) in rows.iter_mut().zip(from) {
         row[to] = from[k];
     }

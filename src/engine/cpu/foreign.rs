@@ -1,20 +1,18 @@
-//! Lanes of a [`VectorDriver`]: they run side by side, so that the driver is called once per step. Frame, criteria and
-//! order are those of the built-in drivers' lanes, in binary32.
+//! Lanes of a [`VectorDriver`]: it is called once per step of a batch. Frame, criteria and order are those of the built-in
+//! drivers' lanes, in binary32.
 
-use std::borrow::Cow;
-
-use rayon::prelude::*;
-
+use crate::cpu::batch_arrays::VehicleTracks;
 use crate::cpu::lane_result::conclude;
+use crate::cpu::side_by_side::SideBySide;
 use crate::frame::{Frame, Simulation, Start};
 use crate::lane::{Observer, Step};
 use crate::lane_case::LaneCase;
-use crate::lane_step::{LaneConstants, LaneState, Moved, OtherState, Seen, advance};
+use crate::lane_step::{LaneConstants, LaneState, OtherState, advance};
 use crate::outcome::{NO_STEP, Outcome};
 use crate::scene::Scene;
 use lanesweep_model::criterion::Criteria;
 use lanesweep_model::driver::{
-    DriverModel, DriverState, Hazard, LaneColumns, MAX_ACCELERATION_MPS2, ModelId, VectorDriver, VehicleColumns, View,
+    DriverModel, DriverState, Hazard, LaneColumns, MAX_ACCELERATION_MPS2, ModelId, VectorDriver, View, row,
 };
 use lanesweep_model::scalar::{Flag, Real};
 use lanesweep_model::scenario::Tables;
@@ -26,9 +24,11 @@ pub(crate) const BATCH_LANES: u64 = 1 << 15;
 /// The place of the driver's model in a step that the engine makes without it: it never reacts. The caller changes the
 /// speed afterwards.
 #[derive(Debug, Clone, Copy)]
-struct Unreacting;
+pub(crate) struct Unreacting;
 
 impl<R: Real> DriverModel<R> for Unreacting {
+    const KEEPS_DECELERATION: bool = false;
+
     fn initial(&self) -> DriverState<R> {
         DriverState { deceleration: R::ZERO, delay_steps: 0 }
     }
@@ -67,53 +67,10 @@ impl<'d, R: Real> Setting<'d, R> {
         Setting { model, driver, dt_s, frame, criteria }
     }
 
-    fn simulation(&self, case: &LaneCase<R>) -> Simulation<'_, R, Unreacting> {
+    fn simulation(&self, is_pair: bool) -> Simulation<'_, R, Unreacting> {
         let Setting { frame, criteria, model, .. } = self;
-        let scene = Scene::unknown(case.pair != 0);
+        let scene = Scene::unknown(is_pair);
         Simulation { frame, criteria, model: &Unreacting, model_index: model.index(), scene }
-    }
-}
-
-/// A lane of a batch.
-struct BatchLane<R> {
-    /// Index of its case in the batch.
-    case: usize,
-    constants: LaneConstants<R>,
-    state: LaneState<R>,
-}
-
-impl<R: Real> BatchLane<R> {
-    fn new(setting: &Setting<'_, R>, at: usize, case: &LaneCase<R>, start: Start<R>) -> Self {
-        let simulation = setting.simulation(case);
-        let constants = LaneConstants::new(&simulation, case);
-        BatchLane { case: at, constants, state: LaneState::new(&simulation, case, start) }
-    }
-
-    /// Moves the lane to its next step, without the driver.
-    fn moved(&self, setting: &Setting<R>, case: &LaneCase<R>, tables: &Tables<R>) -> (Moved<R>, [OtherState<R>; 2]) {
-        let places = places(case, tables, self.state.index);
-        (advance(&setting.simulation(case), &self.constants, &self.state, &places), places)
-    }
-
-    /// Takes the step over, with the driver's acceleration, m/s². Returns the outcome if it was the last step.
-    fn steer(
-        &mut self,
-        setting: &Setting<R>,
-        case: &LaneCase<R>,
-        (moved, places): &(Moved<R>, [OtherState<R>; 2]),
-        acceleration: f32,
-    ) -> Option<Outcome<R>> {
-        let LaneState { index, v_ego, reaction_step, .. } = self.state;
-        self.state = moved.state;
-        if acceleration < 0.0 && reaction_step == NO_STEP {
-            self.state.reaction_step = index;
-        }
-        let is_over = self.state.over.holds();
-        if !is_over {
-            self.state.v_ego = (v_ego + R::from_f64(acceleration.into()) * setting.frame.dt).larger(R::ZERO);
-        }
-        let is_last = is_over || self.state.index >= setting.frame.step_cap;
-        is_last.then(|| conclude(&setting.simulation(case), &self.constants, &self.state, places))
     }
 }
 
@@ -128,124 +85,98 @@ pub(crate) fn run_one<R: Real>(
     start: Start<R>,
     observer: &mut impl Observer<R>,
 ) -> Result<Outcome<R>> {
-    let mut lane = BatchLane::new(setting, 0, case, start);
-    let mut accelerations = setting.driver.start(1, setting.dt_s)?;
+    let Setting { driver, dt_s, frame, .. } = *setting;
+    let simulation = setting.simulation(case.pair != 0);
+    let constants = LaneConstants::new(&simulation, case);
+    let mut state = LaneState::new(&simulation, case, start);
+    let mut accelerations = driver.start(1, dt_s)?;
+    let mut columns = LaneColumns { dt_s, lane: vec![0], stride: 1, ..LaneColumns::default() };
+    columns.state = vec![0.0; driver.state_rows()];
     loop {
-        let moved = lane.moved(setting, case, tables);
-        let LaneState { index, v_ego, .. } = lane.state;
-        observer.step(&Step { index, v_ego, seen: moved.0.seen, hazard: moved.0.hazard });
-        let seen = std::iter::once((0, &lane, case));
-        let found = accelerations(columns_of(index, setting.dt_s, seen, std::slice::from_ref(&moved)))?;
-        check(setting, &found, 1, index, |_| "of a single run".to_owned())?;
-        if let Some(outcome) = lane.steer(setting, case, &moved, found[0]) {
-            return Ok(outcome);
+        let LaneState { index, v_ego, reaction_step, .. } = state;
+        let first = OtherState::of(&case.others[0].motion, tables, index);
+        let second = if case.pair != 0 { OtherState::of(&case.others[1].motion, tables, index) } else { first };
+        let moved = advance(&simulation, &constants, &state, &[first, second]);
+        observer.step(&Step { index, v_ego, seen: moved.seen, hazard: moved.hazard });
+        columns.step = index;
+        columns.rows = vec![0.0; row::COUNT];
+        // Exact in the lane arithmetic.
+        let mut set = |row: usize, value: R| columns.rows[row] = value.to_f64() as f32;
+        set(row::EGO_SPEED, moved.seen[0].view.v_ego);
+        set(row::EGO_ACCELERATION, moved.seen[0].view.a_ego);
+        for (vehicle, first) in row::VEHICLES.into_iter().enumerate().take(1 + case.pair as usize) {
+            let view = moved.seen[vehicle].view;
+            let present = moved.seen[vehicle].present;
+            let attended = present & Flag::reached(index, constants.others[vehicle].attend_from);
+            set(first + row::PRESENT, present.choose(R::ONE, R::ZERO));
+            set(first + row::ATTENDED, attended.choose(R::ONE, R::ZERO));
+            set(first + row::SPEED, view.v_other);
+            set(first + row::GAP, view.gap);
+            set(first + row::LATERAL_GAP, view.lateral_gap);
+            set(first + row::LATERAL_SPEED, view.lateral_towards);
+            set(first + row::HALF_LENGTHS, view.half_lengths);
         }
+        let mut decided = [0.0];
+        accelerations(&mut columns, &mut decided)?;
+        check(setting, &decided, index, |_| "of a single run".to_owned())?;
+        state = moved.state;
+        if decided[0] < 0.0 && reaction_step == NO_STEP {
+            state.reaction_step = index;
+        }
+        if state.over.holds() || state.index >= frame.step_cap {
+            return Ok(conclude(&simulation, &constants, &state, &[first, second]));
+        }
+        state.v_ego = (v_ego + R::from_f64(decided[0].into()) * frame.dt).larger(R::ZERO);
     }
 }
 
-/// Outcomes of lanes side by side, by case and start; `key` names a lane.
+/// Outcomes of a batch of lanes side by side, by case and start; `key` names a lane.
 ///
 /// # Errors
-/// Those of the driver; [`Error::Input`] for accelerations that are missing, NaN or above the maximum.
+/// Those of the driver; [`Error::Input`] for accelerations that are NaN or above the maximum.
 pub(crate) fn run_lanes(
     setting: &Setting<f32>,
-    cases: &[(LaneCase<f32>, Cow<'_, Tables<f32>>)],
+    cases: &[LaneCase<f32>],
+    (tracks, entries): (&[[VehicleTracks; 2]], &[f32]),
     starts: &[Start<f32>],
     key: impl Fn(usize) -> String,
 ) -> Result<Vec<Outcome<f64>>> {
-    let of_case = |at: usize| starts.iter().map(move |start| (at, *start));
-    let lanes = (0..cases.len()).flat_map(of_case);
-    let mut lanes: Vec<BatchLane<f32>> =
-        lanes.map(|(at, start)| BatchLane::new(setting, at, &cases[at].0, start)).collect();
+    let simulation = &setting.simulation(cases.iter().any(|case| case.pair != 0));
+    let mut lanes = SideBySide::new(simulation, cases.iter().zip(tracks), entries, starts);
     // Every lane gets its outcome below.
-    let mut outcomes = vec![Outcome::NONE; lanes.len()];
-    let mut running: Vec<usize> = (0..lanes.len()).collect();
-    let mut accelerations = setting.driver.start(lanes.len(), setting.dt_s)?;
+    let mut outcomes = vec![Outcome::NONE; lanes.count()];
+    let mut accelerations = setting.driver.start(lanes.count(), setting.dt_s)?;
+    lanes.columns.dt_s = setting.dt_s;
+    lanes.columns.state = vec![0.0; setting.driver.state_rows() * lanes.columns.stride];
     let mut step = 0;
-    while !running.is_empty() {
-        let moved = |&at: &usize| {
-            let lane: &BatchLane<f32> = &lanes[at];
-            let (case, tables) = &cases[lane.case];
-            lane.moved(setting, case, tables)
-        };
-        let moved: Vec<_> = running.par_iter().map(moved).collect();
-        let seen = running.iter().map(|&at| (at, &lanes[at], &cases[lanes[at].case].0));
-        let found = accelerations(columns_of(step, setting.dt_s, seen, &moved))?;
-        check(setting, &found, running.len(), step, |at| key(running[at]))?;
-        let mut still_running = Vec::with_capacity(running.len());
-        for ((&at, moved), acceleration) in running.iter().zip(&moved).zip(found) {
-            let lane = &mut lanes[at];
-            match lane.steer(setting, &cases[lane.case].0, moved, acceleration) {
-                Some(outcome) => outcomes[at] = outcome.widen(),
-                None => still_running.push(at),
-            }
-        }
-        running = still_running;
+    while lanes.count() > 0 {
+        lanes.step(simulation, step);
+        let running = lanes.count();
+        let decided = &mut lanes.accelerations[..running];
+        accelerations(&mut lanes.columns, decided)?;
+        check(setting, decided, step, |at| key(lanes.columns.lane[at] as usize))?;
+        lanes.take_finished(simulation, |lane, outcome| outcomes[lane] = outcome.widen());
         step += 1;
     }
     Ok(outcomes)
 }
 
-/// Checks what the driver returned for the running lanes; `key` names one of them.
-fn check<R>(setting: &Setting<R>, found: &[f32], lanes: usize, step: u32, key: impl Fn(usize) -> String) -> Result<()> {
-    let place = || Place::item(format!("driver {}, step {step}", setting.model.name()));
-    if found.len() != lanes {
-        let problem = format!("it returned {} accelerations for {lanes} lanes", found.len());
-        return Err(Error::input(place(), problem, "return one number per lane, in m/s²"));
-    }
-    let most = if setting.driver.may_accelerate() { MAX_ACCELERATION_MPS2 } else { 0.0 };
+/// Checks what the driver decided for the running lanes; `key` names one of them.
+fn check<R>(setting: &Setting<R>, decided: &[f32], step: u32, key: impl Fn(usize) -> String) -> Result<()> {
+    let maximum = if setting.driver.may_accelerate() { MAX_ACCELERATION_MPS2 } else { 0.0 };
     // A NaN is wrong too.
-    let is_right = |acceleration: &f32| (-MAX_ACCELERATION_MPS2..=most).contains(acceleration);
-    let Some(at) = found.iter().position(|acceleration| !is_right(acceleration)) else { return Ok(()) };
-    let problem = format!("its acceleration is {} m/s² in lane {}", found[at], key(at));
-    let help = if found[at] > 0.0 && most == 0.0 {
+    let is_right = |acceleration: &f32| (-MAX_ACCELERATION_MPS2..=maximum).contains(acceleration);
+    if decided.iter().fold(true, |all, acceleration| all & is_right(acceleration)) {
+        return Ok(());
+    }
+    let Some(at) = decided.iter().position(|acceleration| !is_right(acceleration)) else { return Ok(()) };
+    let problem = format!("its acceleration is {} m/s² in lane {}", decided[at], key(at));
+    let help = if decided[at] > 0.0 && maximum == 0.0 {
         "say that the driver may accelerate, or return at most 0".to_owned()
     } else {
         format!("return finite numbers of at most {MAX_ACCELERATION_MPS2} m/s²")
     };
-    Err(Error::input(place(), problem, help))
-}
-
-/// The other vehicles of a case at a step.
-fn places<R: Real>(case: &LaneCase<R>, tables: &Tables<R>, step: u32) -> [OtherState<R>; 2] {
-    let first = OtherState::of(&case.others[0].motion, tables, step);
-    [first, if case.pair != 0 { OtherState::of(&case.others[1].motion, tables, step) } else { first }]
-}
-
-/// What the drivers of the running lanes see after these moved to a step.
-fn columns_of<'a, R: Real>(
-    step: u32,
-    dt_s: f64,
-    lanes: impl Iterator<Item = (usize, &'a BatchLane<R>, &'a LaneCase<R>)>,
-    moved: &[(Moved<R>, [OtherState<R>; 2])],
-) -> LaneColumns {
-    let mut columns = LaneColumns { step, time_s: f64::from(step) * dt_s, ..LaneColumns::default() };
-    for ((at, lane, case), (moved, _)) in lanes.zip(moved) {
-        columns.lane.push(at as i64);
-        columns.ego_speed.push(narrow(moved.seen[0].view.v_ego));
-        columns.ego_acceleration.push(narrow(moved.seen[0].view.a_ego));
-        for (k, vehicle) in columns.vehicles.iter_mut().enumerate() {
-            let exists = k == 0 || case.pair != 0;
-            push(vehicle, &moved.seen[k], exists, lane.constants.others[k].attend_from <= step);
-        }
-    }
-    columns
-}
-
-/// Exact in the lane arithmetic.
-fn narrow<R: Real>(value: R) -> f32 {
-    value.to_f64() as f32
-}
-
-fn push<R: Real>(vehicle: &mut VehicleColumns, seen: &Seen<R>, exists: bool, may_attend: bool) {
-    let present = exists && seen.present.holds();
-    vehicle.present.push(present);
-    vehicle.attended.push(present && may_attend);
-    vehicle.speed.push(narrow(seen.view.v_other));
-    vehicle.gap.push(narrow(seen.view.gap));
-    vehicle.lateral_gap.push(narrow(seen.view.lateral_gap));
-    vehicle.lateral_speed.push(narrow(seen.view.lateral_towards));
-    vehicle.half_lengths.push(narrow(seen.view.half_lengths));
+    Err(Error::input(Place::item(format!("driver {}, step {step}", setting.model.name())), problem, help))
 }
 
 #[cfg(test)]
@@ -262,6 +193,7 @@ mod tests {
     /// A built-in driver behind the interface of foreign ones.
     struct Wrapped {
         profile: Profile,
+        batch_lanes: usize,
         wrong: Option<f32>,
     }
 
@@ -274,45 +206,63 @@ mod tests {
             false
         }
 
-        fn start(&self, lanes: usize, dt_s: f64) -> Result<Accelerations<'_>> {
+        fn batch_lanes(&self) -> usize {
+            self.batch_lanes
+        }
+
+        fn state_rows(&self) -> usize {
+            2
+        }
+
+        fn start(&self, _lanes: usize, dt_s: f64) -> Result<Accelerations<'_>> {
             // The constants of RSS do not depend on the category.
             let rss = self.profile.rss.resolve::<f32>(dt_s, Category::CutIn);
-            let mut states = vec![DriverModel::<f32>::initial(&rss); lanes];
-            Ok(Box::new(move |columns| {
-                let one = |row: usize| {
-                    let state = &mut states[columns.lane[row] as usize];
-                    let v_ego = columns.ego_speed[row];
+            let initial = DriverModel::<f32>::initial(&rss);
+            Ok(Box::new(move |columns, decided| {
+                if columns.step == 0 {
+                    let (delay_steps, deceleration) = columns.state.split_at_mut(columns.stride);
+                    delay_steps.fill(initial.delay_steps as f32);
+                    deceleration.fill(initial.deceleration);
+                }
+                let mut one = |at: usize| {
+                    let see = |row: usize| columns.row(row)[at];
+                    let v_ego = see(row::EGO_SPEED);
                     let mut nearest: Option<(f32, Hazard<f32>)> = None;
-                    for vehicle in &columns.vehicles {
+                    for first in row::VEHICLES {
                         let view = View {
                             v_ego,
-                            a_ego: columns.ego_acceleration[row],
-                            v_other: vehicle.speed[row],
-                            gap: vehicle.gap[row],
-                            lateral_gap: vehicle.lateral_gap[row],
-                            lateral_towards: vehicle.lateral_speed[row],
-                            half_lengths: vehicle.half_lengths[row],
+                            a_ego: see(row::EGO_ACCELERATION),
+                            v_other: see(first + row::SPEED),
+                            gap: see(first + row::GAP),
+                            lateral_gap: see(first + row::LATERAL_GAP),
+                            lateral_towards: see(first + row::LATERAL_SPEED),
+                            half_lengths: see(first + row::HALF_LENGTHS),
                             // RSS does not read it.
                             marking_gap: 0.0,
                         };
                         let hazard = rss.check(&view);
-                        let reacts = vehicle.attended[row] && hazard.is_unsafe.holds();
+                        let reacts = see(first + row::ATTENDED) != 0.0 && hazard.is_unsafe.holds();
                         if reacts && nearest.is_none_or(|(gap, _)| view.gap < gap) {
                             nearest = Some((view.gap, hazard));
                         }
                     }
                     let Some((_, hazard)) = nearest else { return 0.0 };
-                    let (next, _) = rss.react(*state, &hazard, v_ego);
-                    let delayed = state.delay_steps > 0;
-                    *state = next;
+                    let [delay_steps, deceleration] = [at, columns.stride + at];
+                    let state = DriverState {
+                        delay_steps: columns.state[delay_steps] as u32,
+                        deceleration: columns.state[deceleration],
+                    };
+                    let (next, _) = rss.react(state, &hazard, v_ego);
+                    columns.state[delay_steps] = next.delay_steps as f32;
+                    columns.state[deceleration] = next.deceleration;
                     // Coasts at its present speed for the reaction time, or brakes.
-                    if delayed { 0.0 } else { -next.deceleration }
+                    if state.delay_steps > 0 { 0.0 } else { -next.deceleration }
                 };
-                let mut found: Vec<f32> = (0..columns.lane.len()).map(one).collect();
+                (0..decided.len()).for_each(|at| decided[at] = one(at));
                 if let Some(wrong) = self.wrong.filter(|_| columns.step == 3) {
-                    found[0] = wrong;
+                    decided[0] = wrong;
                 }
-                Ok(found)
+                Ok(())
             }))
         }
     }
@@ -332,26 +282,30 @@ mod tests {
         Ok(all)
     }
 
+    fn driver(wrong: Option<f32>, batch_lanes: usize) -> Arc<Wrapped> {
+        Arc::new(Wrapped { profile: Profile::load("paper").unwrap(), batch_lanes, wrong })
+    }
+
     fn wrapped(name: &str, wrong: Option<f32>) -> ModelId {
-        let driver = Wrapped { profile: Profile::load("paper").unwrap(), wrong };
-        ModelId::register(name, "1", Arc::new(driver)).unwrap()
+        ModelId::register(name, "1", driver(wrong, usize::MAX)).unwrap()
     }
 
     /// Beside a built-in model in one plan, with verdicts and outcomes.
     #[test]
     fn a_built_in_driver_behind_the_interface_gives_its_own_lanes() {
-        let plan = plan(vec![ModelId::Rss, wrapped("wrapped", None)]);
+        let in_small_batches = ModelId::register("small", "1", driver(None, 100)).unwrap();
+        let plan = plan(vec![ModelId::Rss, wrapped("wrapped", None), in_small_batches]);
         for backend in [CpuBackend::lane_arithmetic(), CpuBackend::scalar()] {
             let all = outcomes(&plan, &backend).unwrap();
             assert!(all.len() > 10_000 && all.iter().any(|outcome| outcome.verdicts.0 != 0));
-            for (lane, pair) in all.chunks(2).enumerate() {
+            for (lane, own) in all.chunks(3).enumerate() {
                 // The step of the first reaction differs: the interface has no word for coasting.
-                let wrapped = Outcome { reaction_step: pair[0].reaction_step, ..pair[1] };
-                assert_eq!(wrapped, pair[0], "lane {lane}");
+                let wrapped = Outcome { reaction_step: own[0].reaction_step, ..own[1] };
+                assert_eq!((wrapped, own[2]), (own[0], own[1]), "lane {lane}");
             }
             let executor = Executor::new(&backend).with_recheck(1);
             let verdicts = |chunk: Chunk| {
-                assert!(chunk.verdicts.chunks(2).all(|pair| pair[0] == pair[1]));
+                assert!(chunk.verdicts.chunks(3).all(|own| own[0] == own[1] && own[0] == own[2]));
                 Ok(())
             };
             executor.sweep(&plan, 0..plan.unit_count(), Wanted::Verdicts, verdicts).unwrap();
@@ -359,7 +313,7 @@ mod tests {
         // Single lanes, as traces run them.
         let runner = LaneRunner::<f32>::new(&plan);
         let all = outcomes(&plan, CpuBackend::lane_arithmetic()).unwrap();
-        for lane in (1..plan.lane_count()).step_by(2 * 97) {
+        for lane in (1..plan.lane_count()).step_by(3 * 97) {
             assert_eq!(runner.run(&plan.key(lane).unwrap()).widen(), all[lane as usize], "lane {lane}");
         }
         let error = outcomes(&plan, CpuBackend::reference()).unwrap_err().to_string();
@@ -377,7 +331,7 @@ mod tests {
 
     #[test]
     fn a_name_is_a_word_that_no_built_in_model_has_and_a_plan_knows_its_fingerprint() {
-        let driver = || Arc::new(Wrapped { profile: Profile::load("paper").unwrap(), wrong: None });
+        let driver = || driver(None, usize::MAX);
         for name in ["", "rss", "CC", "all", "a b", "a/b"] {
             assert!(ModelId::register(name, "1", driver()).is_err(), "{name}");
         }

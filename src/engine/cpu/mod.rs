@@ -1,5 +1,6 @@
-//! Lanes on the CPU: single lanes, batches on vector instructions, and the work that verdict-only batches
-//! skip ([`fast_forward`], [`steady_following`], [`lead_only`]), and lanes of drivers outside the registry ([`foreign`]). The step itself is [`lane_step`](super::lane_step)'s.
+//! Lanes on the CPU: single lanes, batches on vector instructions, and the work that verdict-only batches skip
+//! ([`fast_forward`], [`steady_following`], [`lead_only`]), and lanes of drivers outside the registry ([`foreign`],
+//! [`side_by_side`]). The step itself is [`lane_step`](super::lane_step)'s.
 
 pub(crate) mod backend;
 mod batch;
@@ -13,6 +14,7 @@ pub(crate) mod pending_lanes;
 pub(crate) mod runner;
 pub(crate) mod series;
 pub(crate) mod shared_rules;
+mod side_by_side;
 pub(crate) mod simd;
 mod steady_following;
 

@@ -4,6 +4,8 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Mutex;
 
+use rayon::prelude::*;
+
 use crate::cpu::foreign::{Setting, run_lanes};
 use crate::cpu::lane_result::Ending;
 use crate::cpu::pending_lanes::Lanes;
@@ -182,13 +184,24 @@ impl LaneRunner<'_, f32> {
         let setting = Setting::new((model, driver), frames[model.index()], criteria, *dt_s);
         let of_block = &plan.blocks[block];
         let variants = of_block.variants.len();
-        let keys = units.flat_map(|unit| (0..variants).map(move |variant| (unit, variant)));
-        let cases: Vec<_> = keys.map(|(unit, variant)| self.case(block, unit, variant)).collect();
-        run_lanes(&setting, &cases, &self.starts, |lane| {
-            let (case, headway) = (lane / self.starts.len(), lane % self.starts.len());
-            let unit = of_block.units.name(first_unit + (case / variants) as u64);
-            format!("{unit}/{}/{}/{}", of_block.variants[case % variants], plan.headways[headway], model.name())
-        })
+        let keys: Vec<_> = units.flat_map(|unit| (0..variants).map(move |variant| (unit, variant))).collect();
+        let batch_cases = (driver.batch_lanes() / self.starts.len().max(1)).max(1);
+        let batch = |(at, keys): (usize, &[(u64, usize)])| {
+            let mut tables = Tables::default();
+            let case = |&(unit, variant): &_| self.case_with_series(block, unit, variant, &mut tables);
+            let cases: Vec<LaneCase<f32>> = keys.iter().map(case).collect();
+            let mut series = Series::default();
+            let tracks: Vec<_> =
+                cases.iter().map(|case| series.unroll(case, &tables, plan.profile.step_cap())).collect();
+            drop(tables);
+            run_lanes(&setting, &cases, (&tracks, series.entries()), &self.starts, |lane| {
+                let (case, headway) = (at * batch_cases + lane / self.starts.len(), lane % self.starts.len());
+                let unit = of_block.units.name(first_unit + (case / variants) as u64);
+                format!("{unit}/{}/{}/{}", of_block.variants[case % variants], plan.headways[headway], model.name())
+            })
+        };
+        let outcomes: Result<Vec<_>> = keys.par_chunks(batch_cases).enumerate().map(batch).collect();
+        Ok(outcomes?.concat())
     }
 }
 

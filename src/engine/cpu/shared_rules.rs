@@ -50,14 +50,10 @@ impl Rules {
     /// Rules of a simulation; `None` for the exact form of the BTN, which iterates and runs lane by lane.
     /// `values`: the sweep returns values, not only verdicts.
     pub(crate) fn of(frame: &Frame<f32>, criteria: &Criteria<f32>, scene: Scene, values: bool) -> Option<Rules> {
-        let is_ratio = match criteria.btn.form() {
-            BtnForm::EquivalentDelay => false,
-            BtnForm::DistanceRatio => true,
-            BtnForm::Exact => return None,
-        };
+        let rarely_used = Rules::side_by_side(criteria, scene.is_pair, values)?;
         // Rarely used rules always test for contacts between two steps.
-        if is_ratio || frame.abort_above_ttc > 0.0 || frame.largest_demand {
-            return Some(seldom(if scene.is_pair { CROSSING } else { ALONE_CROSSING }, is_ratio, values));
+        if rarely_used.is_ratio || frame.abort_above_ttc > 0.0 || frame.largest_demand {
+            return Some(rarely_used);
         }
         let sees_overlap = criteria.gate == LateralGate::Overlap;
         Some(match scene {
@@ -65,6 +61,17 @@ impl Rules {
             Scene { may_cross: true, .. } => usual(CROSSING, sees_overlap, !values),
             Scene { is_pair, .. } => usual(if is_pair { PAIR } else { ALONE }, sees_overlap, !values),
         })
+    }
+
+    /// The rarely used rules, which are those of lanes of drivers outside the registry: such a driver may accelerate, so
+    /// any of its lanes may cross. `None` for the exact form of the BTN.
+    pub(crate) fn side_by_side(criteria: &Criteria<f32>, is_pair: bool, keeps_measures: bool) -> Option<Rules> {
+        let is_ratio = match criteria.btn.form() {
+            BtnForm::EquivalentDelay => false,
+            BtnForm::DistanceRatio => true,
+            BtnForm::Exact => return None,
+        };
+        Some(seldom(if is_pair { CROSSING } else { ALONE_CROSSING }, is_ratio, keeps_measures))
     }
 
     /// Rules of steady-following steps with a single vehicle, for verdicts only.

@@ -17,9 +17,11 @@ use super::{
     series::{goes_on, places},
 };
 use crate::cpu::batch::{Fleet, burst};
+use crate::cpu::foreign::Unreacting;
 use crate::cpu::pending_lanes::{Pending, take};
 use crate::cpu::series::Window;
 use crate::cpu::shared_rules::Rules;
+use crate::cpu::side_by_side::{Turn, make_step_of, make_step_of_any};
 use crate::frame::Simulation;
 use lanesweep_model::driver::DriverModel;
 use lanesweep_support::{Error, Place, Result};
@@ -68,6 +70,50 @@ pub(crate) fn burst_for<M: DriverModel<f32>>(instructions: Instructions, rules: 
         Instructions::Neon => Some(Burst { run: for_rules!(burst_neon, M, rules) }),
         _ => None,
     }
+}
+
+/// A step of lanes side by side, compiled for an instruction set and a set of rules.
+pub(crate) struct Beside(MakeStep);
+
+type MakeStep = unsafe fn(&Simulation<'_, f32, Unreacting>, &mut Turn<'_>);
+
+impl Beside {
+    /// The step for these rules; without them, that for any.
+    pub(super) fn of(instructions: Instructions, rules: Option<Rules>) -> Beside {
+        Beside(rules.and_then(|rules| Beside::known(instructions, rules)).unwrap_or(make_step_of_any::<Unreacting>))
+    }
+
+    fn known(instructions: Instructions, rules: Rules) -> Option<MakeStep> {
+        Some(match instructions {
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx2 if instructions.is_available() => {
+                for_rules!(beside_avx2, Unreacting, rules, 14 15 16 17 18 19 20 21)
+            }
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx512 if instructions.is_available() => {
+                for_rules!(beside_avx512, Unreacting, rules, 14 15 16 17 18 19 20 21)
+            }
+            _ => return None,
+        })
+    }
+
+    /// Makes it.
+    pub(super) fn run(&self, simulation: &Simulation<'_, f32, Unreacting>, turn: &mut Turn<'_>) {
+        // SAFETY: as in `Burst::run`; `known` has detected the instructions.
+        unsafe { (self.0)(simulation, turn) }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn beside_avx2<M: DriverModel<f32>, const RULES: u32>(simulation: &Simulation<'_, f32, M>, turn: &mut Turn<'_>) {
+    make_step_of::<M, RULES>(simulation, turn);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
+fn beside_avx512<M: DriverModel<f32>, const RULES: u32>(simulation: &Simulation<'_, f32, M>, turn: &mut Turn<'_>) {
+    make_step_of::<M, RULES>(simulation, turn);
 }
 
 #[cfg(target_arch = "x86_64")]

@@ -1,4 +1,4 @@
-//! Drivers outside the registry: a function that gets all running lanes at one step, in columns, and returns an
+//! Drivers outside the registry: a function that gets all running lanes at one step, in rows of numbers, and writes an
 //! acceleration per lane. A program registers its driver under a name and uses it like the built-in ones.
 
 use std::sync::{Arc, RwLock};
@@ -9,44 +9,59 @@ use lanesweep_support::{Error, Place, Result, option};
 /// Largest magnitude of an acceleration, m/s²: a larger one is an error of the driver.
 pub const MAX_ACCELERATION_MPS2: f32 = 100.0;
 
-/// One other vehicle as the drivers of all running lanes see it; an entry per lane.
-#[derive(Debug, Default, Clone)]
-pub struct VehicleColumns {
-    /// The vehicle is there for the ego. Where it is not, the other entries have no meaning.
-    pub present: Vec<bool>,
-    /// It is there, and the driver may react to it: the attention rule of the model whose place the driver takes.
-    pub attended: Vec<bool>,
-    /// Speed, m/s.
-    pub speed: Vec<f32>,
-    /// Gap, bumper to bumper, m; negative when the vehicles overlap along the road.
-    pub gap: Vec<f32>,
-    /// Lateral gap, m; negative when the vehicles overlap laterally.
-    pub lateral_gap: Vec<f32>,
-    /// Lateral speed towards the ego, m/s.
-    pub lateral_speed: Vec<f32>,
-    /// Half the sum of both lengths, m: the distance of the centres is the gap plus this.
-    pub half_lengths: Vec<f32>,
+/// Rows of [`LaneColumns::rows`]: the ego's, then those of the principal vehicle, then those of the one ahead of it in a
+/// cut-out. Numbers are m, m/s and m/s²; flags are 1 or 0.
+pub mod row {
+    /// Speed of the ego.
+    pub const EGO_SPEED: usize = 0;
+    /// Acceleration of the ego over the last step; 0 at the start.
+    pub const EGO_ACCELERATION: usize = 1;
+    /// First row of each other vehicle; the following rows are counted from it.
+    pub const VEHICLES: [usize; 2] = [2, 9];
+    /// Flag: the vehicle is there for the ego. Where it is not, its other rows have no meaning.
+    pub const PRESENT: usize = 0;
+    /// Flag: it is there, and the driver may react to it: the attention rule of the model whose place the driver takes.
+    pub const ATTENDED: usize = 1;
+    /// Speed.
+    pub const SPEED: usize = 2;
+    /// Gap, bumper to bumper; negative when the vehicles overlap along the road.
+    pub const GAP: usize = 3;
+    /// Lateral gap; negative when the vehicles overlap laterally.
+    pub const LATERAL_GAP: usize = 4;
+    /// Lateral speed towards the ego.
+    pub const LATERAL_SPEED: usize = 5;
+    /// Half the sum of both lengths: the distance of the centres is the gap plus this.
+    pub const HALF_LENGTHS: usize = 6;
+    /// Number of rows.
+    pub const COUNT: usize = 16;
 }
 
-/// All running lanes of a batch at one step; an entry per lane.
+/// All running lanes of a batch at one step.
 #[derive(Debug, Default, Clone)]
 pub struct LaneColumns {
     /// Index of the step.
     pub step: u32,
-    /// Time since the start, s.
-    pub time_s: f64,
-    /// Position of each lane in its batch: where a driver keeps the lane's state. Ascending.
+    /// Time step, s.
+    pub dt_s: f64,
+    /// Position of each running lane in its batch: where a driver keeps the lane's state. In no order.
     pub lane: Vec<i64>,
-    /// Speed of the ego, m/s.
-    pub ego_speed: Vec<f32>,
-    /// Acceleration of the ego over the last step, m/s²; 0 at the start.
-    pub ego_acceleration: Vec<f32>,
-    /// The principal vehicle, and the one ahead of it in a cut-out.
-    pub vehicles: [VehicleColumns; 2],
+    /// Entries of a row, at least one per running lane; the others have no meaning.
+    pub stride: usize,
+    /// What the drivers see: the rows of [`row`], one after the other. A driver may take them away.
+    pub rows: Vec<f32>,
+    /// Rows of the drivers' own ([`VectorDriver::state_rows`]), which move with the lanes; 0 at the start.
+    pub state: Vec<f32>,
 }
 
-/// Returns an acceleration, m/s², for every lane of the columns.
-pub type Accelerations<'a> = Box<dyn FnMut(LaneColumns) -> Result<Vec<f32>> + 'a>;
+impl LaneColumns {
+    /// A row, with an entry per running lane.
+    pub fn row(&self, row: usize) -> &[f32] {
+        &self.rows[row * self.stride..][..self.lane.len()]
+    }
+}
+
+/// Writes an acceleration, m/s², for every running lane of the columns.
+pub type Accelerations<'a> = Box<dyn FnMut(&mut LaneColumns, &mut [f32]) -> Result<()> + 'a>;
 
 /// A driver of many lanes at once.
 pub trait VectorDriver: Send + Sync {
@@ -57,6 +72,14 @@ pub trait VectorDriver: Send + Sync {
     /// Whether the driver may accelerate. Lanes then run to a contact or the time cap; otherwise they also end once no
     /// further event is possible, like those of the built-in drivers.
     fn may_accelerate(&self) -> bool;
+    /// Maximum number of lanes of a batch. Batches run in threads, each with a function of its own.
+    fn batch_lanes(&self) -> usize {
+        usize::MAX
+    }
+    /// Number of the rows of [`LaneColumns::state`].
+    fn state_rows(&self) -> usize {
+        0
+    }
     /// Starts a batch of lanes with a time step of `dt_s`; the function keeps the state of their drivers.
     ///
     /// # Errors

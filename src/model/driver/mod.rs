@@ -17,7 +17,7 @@ mod foreign;
 mod profile;
 
 pub use attention::{AttentionRule, BelowTrigger, LaneGeometry, NEVER, lane_centre};
-pub use foreign::{Accelerations, ForeignId, LaneColumns, MAX_ACCELERATION_MPS2, VectorDriver, VehicleColumns};
+pub use foreign::{Accelerations, ForeignId, LaneColumns, MAX_ACCELERATION_MPS2, VectorDriver, row};
 pub use profile::{Bound, DriverProfile};
 pub(crate) use profile::{SHORT_STEP_S, delay_bound_s};
 

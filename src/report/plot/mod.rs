@@ -245,7 +245,7 @@ impl Figure {
     }
 
     /// The numbers of the series: one row per value.
-    pub fn csv(&self) -> String {
+    pub(crate) fn numbers(&self) -> Table {
         let series = self.plots.iter().flat_map(|plot| plot.series.iter().map(move |series| (plot, series)));
         let rows = series.flat_map(|(plot, series)| series.values.iter().map(move |value| (plot, series, value)));
         Table::of(rows)
@@ -262,7 +262,6 @@ impl Figure {
             .column("y_low", |(_, series, value)| series.ends_of(value, false).map(|ends| ends.0))
             .column("y_high", |(_, series, value)| series.ends_of(value, false).map(|ends| ends.1))
             .build()
-            .csv()
     }
 
     fn width_px(&self) -> f64 {

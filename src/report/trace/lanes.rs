@@ -1,13 +1,15 @@
 //! Lanes step by step, as `simulate` shows them: figure, table, document and summaries.
 
 use super::{TraceFigure, TracePanels, TraceSeries, table};
-use crate::lanes::outcome_record;
+use crate::lanes::{outcome_record, with_outcomes};
 use crate::records::{self, PROGRAM, record};
 use lanesweep_engine::{EndReason, NO_STEP, Outcome, Trace};
 use lanesweep_model::criterion::Criterion;
 use lanesweep_run::reopen::{TracedLane, TracedLanes};
 use lanesweep_support::Result;
 use lanesweep_support::readable::value;
+use lanesweep_support::run_folder::NamedTable;
+use lanesweep_support::table::Table;
 
 /// Lanes step by step, as figure, table, document and text.
 pub struct TraceReport<'a>(pub &'a TracedLanes);
@@ -44,6 +46,17 @@ impl TraceReport<'_> {
     /// Every step as CSV.
     pub fn csv(&self) -> String {
         table(&self.named()).csv()
+    }
+
+    /// A row per lane, and one per step.
+    pub fn tables(&self) -> Vec<NamedTable> {
+        let lanes = Table::of(&self.0.lanes)
+            .column("lane", |lane| lane.key.as_str())
+            .column("category", |lane| lane.trace.category.key())
+            .column("model", |lane| lane.trace.model.name())
+            .column("initial_gap_m", |lane| lane.trace.initial_gap_m);
+        let lanes = with_outcomes(lanes.build(), self.0.lanes.iter().map(|lane| &lane.trace));
+        vec![("lanes".to_owned(), lanes), ("steps".to_owned(), table(&self.named()))]
     }
 
     /// Outcomes and series as one document.

@@ -138,6 +138,7 @@ cell_values! {
     // An empty text is null.
     String => Text, |text| if text.is_empty() { Cell::Null } else { Cell::text(text) };
     &str => Text, |text| text.to_owned().cell();
+    bool => Flag, Cell::Flag;
     f64 => Binary64, Cell::Number;
     u8, u32, u64, usize, i64 => Whole, whole;
 }
