@@ -13,6 +13,7 @@ pub mod case_sheet;
 pub mod case_table;
 pub mod density;
 mod dots;
+mod explorer;
 pub mod host;
 mod html;
 pub mod lanes;
