@@ -155,6 +155,9 @@ impl From<Argument> for Given {
     }
 }
 
+/// Exit status, record, messages and tables by name.
+type Ran = (u8, String, String, Vec<(String, Frame)>);
+
 /// Runs a verb by the name of its function, with the values of named arguments: exit code, text, document and tables.
 #[pyfunction]
 #[pyo3(signature = (function, call, arguments, on_progress=None, on_message=None))]
@@ -165,7 +168,7 @@ pub fn run(
     arguments: &Bound<'_, PyDict>,
     on_progress: Option<&Bound<'_, PyAny>>,
     on_message: Option<&Bound<'_, PyAny>>,
-) -> PyResult<(u8, String, String, Vec<(String, Frame)>)> {
+) -> PyResult<Ran> {
     let given = arguments.iter().map(|(name, one)| Ok((name.extract()?, one.extract::<Argument>()?.into())));
     let given = given.collect::<PyResult<Vec<(String, Given)>>>()?;
     watched(py, on_progress, on_message, move || {

@@ -26,6 +26,7 @@ mod partial;
 pub mod plan;
 mod recheck;
 mod scene;
+pub mod shader;
 mod trace;
 pub mod verify;
 pub mod version;

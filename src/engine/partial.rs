@@ -1,7 +1,6 @@
 //! Results of lanes as exact integer counts per unit. A chunk, a journal record and a shard's part are partials.
 //! Merging is associative and commutative.
 
-
 use serde::{Deserialize, Serialize};
 
 use super::backend::Chunk;

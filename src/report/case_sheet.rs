@@ -341,6 +341,7 @@ impl CaseSheet<'_> {
             lead: format!("{}. {}.", self.case(), self.answer()),
             synthetic: self.is_synthetic,
             warnings,
+            app: None,
             sections: [answer, case, drivers, self.identity_section(), self.identity.signatures(), course, others]
                 .into_iter()
                 .chain(self.by_rule_section())

@@ -29,6 +29,11 @@ pub(crate) struct PageFigure {
 }
 
 impl PageFigure {
+    /// Its size in the page.
+    pub(crate) fn bytes(&self) -> usize {
+        self.svg.len()
+    }
+
     /// From a complete SVG document.
     pub(crate) fn new(svg: &str, files: &[&str]) -> PageFigure {
         let (svg, width_px) = inline(svg);
@@ -83,8 +88,19 @@ pub(super) struct Page {
     pub synthetic: bool,
     /// Warnings at the top of the page.
     pub warnings: Vec<String>,
+    /// A program before the chapters.
+    pub app: Option<App>,
     /// The chapters.
     pub sections: Vec<Section>,
+}
+
+/// What a page computes where it is read: markup, style, script, and its data as JSON.
+#[derive(Debug, Clone, Default)]
+pub(super) struct App {
+    pub markup: &'static str,
+    pub style: &'static str,
+    pub script: String,
+    pub data: String,
 }
 
 impl Section {
@@ -174,7 +190,14 @@ impl Page {
     /// The page as a complete HTML document. The same page gives the same bytes.
     pub(super) fn html(&self) -> String {
         let title = Escaped(&self.title);
-        let script_sha256 = BASE64_STANDARD.encode(Sha256::digest(SCRIPT));
+        let App { markup, style, script, data } = self.app.clone().unwrap_or_default();
+        let script = format!("{SCRIPT}{script}");
+        let script_sha256 = BASE64_STANDARD.encode(Sha256::digest(&script));
+        let data = if data.is_empty() {
+            data
+        } else {
+            format!("\n<script type=\"application/json\" id=\"explorer-data\">{data}</script>")
+        };
         let synthetic = "SYNTHETIC DATA: nothing on this page is a statement about real traffic.";
         let warnings = self.synthetic.then_some(synthetic).into_iter().chain(self.warnings.iter().map(String::as_str));
         let warnings: String =
@@ -194,8 +217,8 @@ impl Page {
              script-src 'sha256-{script_sha256}'; img-src data:; base-uri 'none'; form-action 'none'\">\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
              <meta name=\"generator\" content=\"{program}\">\n<title>{title}</title>\n<link rel=\"icon\" href=\"data:,\">\n\
-             <style>\n{STYLE}\n{footer}\n</style>\n</head>\n<body>\n<header>\n<h1>{title}</h1>\n<p>{lead}</p>{warnings}\n</header>\n\
-             <main>{sections}\n</main>\n<div id=\"tip\" role=\"status\" hidden></div>\n<script>{SCRIPT}</script>\n</body>\n</html>",
+             <style>\n{STYLE}\n{style}{footer}\n</style>\n</head>\n<body>\n<header>\n<h1>{title}</h1>\n<p>{lead}</p>{warnings}\n</header>\n\
+             <main>{markup}{sections}\n</main>\n<div id=\"tip\" role=\"status\" hidden></div>{data}\n<script>{script}</script>\n</body>\n</html>",
             program = Escaped(PROGRAM),
             footer = self.footer(),
             lead = Escaped(&self.lead),

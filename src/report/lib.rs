@@ -14,6 +14,7 @@ pub mod case_table;
 pub mod column_words;
 pub mod density;
 mod dots;
+mod explorer;
 pub mod host;
 mod html;
 pub mod lanes;

@@ -11,6 +11,9 @@ use lanesweep_support::Result;
 use lanesweep_support::readable::count;
 use lanesweep_support::run_folder::{ResultFiles, Results};
 
+/// A figure with more bytes is a file only.
+const MAX_FIGURE_BYTES: usize = 100_000;
+
 /// A complete run.
 pub struct MapReport {
     /// The grids.
@@ -43,30 +46,27 @@ impl MapReport {
     /// # Errors
     /// [`lanesweep_support::Error::Io`] if the folder cannot be written to.
     pub fn write(&self, mut results: Results) -> Result<ResultFiles> {
-        let mut figures = Vec::new();
+        let mut figure = None;
         let outcomes = self.shown_outcomes();
         for mapped in &self.grids {
             let not_preventable = self.not_preventable(mapped);
             for (at, model) in mapped.map.models.iter().enumerate() {
                 let svg = self.sheet(mapped, at, &outcomes, not_preventable.clone());
                 let name = format!("{}_{}", mapped.plan.grid.name, slug(model.name()));
-                figures.push(PageFigure::add_svg(&mut results, &name, &svg, "cells.csv")?);
+                let added = PageFigure::add_svg(&mut results, &name, &svg, "cells.csv")?;
+                figure.get_or_insert(added);
             }
         }
-        results.add("report.html", self.html(figures).as_bytes())?;
+        results.add("report.html", self.html(figure)?.as_bytes())?;
         results.add_table("cells.csv", self.cells())?;
         publish(results, |files| self.json(files))
     }
 
-    /// Renders the run as one page.
-    fn html(&self, figures: Vec<PageFigure>) -> String {
-        let is_known = self.grids.iter().any(|mapped| mapped.known_percent.iter().any(Option::is_some));
-        let shares = Section::new("shares", "Shares")
-            .intro(if is_known { "Known shares are those of the JRC's evidence." } else { "" })
-            .tables([self.shares().captioned(self.caption())])
-            .parts([Section::new("", "What the columns count").text(self.words())]);
-        let reproduction = self.host.section(&self.profile).folded();
-        Page {
+    /// Renders the run as one page: the explorer, and a figure to print.
+    fn html(&self, figure: Option<PageFigure>) -> Result<String> {
+        let is_short = |figure: &PageFigure| figure.bytes() <= MAX_FIGURE_BYTES;
+        let print = Section::new("figure", "Figure to print").figures(figure.filter(is_short)).folded();
+        let page = Page {
             title: "Outcomes over a grid".to_owned(),
             lead: format!(
                 "{} {} simulations: {} over a grid of parameters, profile {}.",
@@ -75,10 +75,11 @@ impl MapReport {
                 self.criterion.label(),
                 self.profile.name
             ),
-            sections: vec![shares, Section::new("maps", "Maps").figures(figures), reproduction],
+            app: Some(self.explorer()?),
+            sections: vec![print, self.host.section(&self.profile).folded()],
             ..Page::default()
-        }
-        .html()
+        };
+        Ok(page.html())
     }
 
     pub(super) fn is_robust(&self) -> bool {

@@ -41,7 +41,7 @@ impl MapReport {
         })
     }
 
-    fn grid_record<'a>(&self, mapped: &'a MappedGrid, shown: &[CellOutcome]) -> impl Serialize + use<'a> {
+    pub(super) fn grid_record<'a>(&self, mapped: &'a MappedGrid, shown: &[CellOutcome]) -> impl Serialize + use<'a> {
         let (grid, map) = (&mapped.plan.grid, &mapped.map);
         let axis = |axis: &'a GridAxis| record! { parameter: axis.parameter.key, values: &axis.values };
         let shares = map.models.iter().enumerate().map(|(at, model)| {

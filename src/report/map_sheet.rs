@@ -27,13 +27,13 @@ pub(super) struct MapSheet<'a> {
 }
 
 /// Colour of the boundary of cases that are not preventable.
-const BOUNDARY: &str = "#c40000";
+pub(super) const BOUNDARY: &str = "#c40000";
 /// More plots in a row than this make a wide sheet; and how many a row has at most.
 const MAX_NARROW: usize = 3;
 const MAX_COLUMNS: usize = 8;
 
 /// Colour of an outcome.
-fn colour(outcome: CellOutcome) -> &'static str {
+pub(super) fn colour(outcome: CellOutcome) -> &'static str {
     match outcome {
         CellOutcome::NoConflict => "#ffffff",
         CellOutcome::Pass => "#f3dfa2",
@@ -155,11 +155,7 @@ impl MapSheet<'_> {
     /// `ego 90 km/h`.
     fn value_name(&self, axis: usize, value: f64) -> String {
         let parameter = self.grid.panel_axes[axis].parameter;
-        let word = match parameter.key.split_once("_speed") {
-            Some((vehicle, _)) => vehicle.to_owned(),
-            None => parameter.key.rsplit_once('_').map_or(parameter.key, |(name, _)| name).replace('_', " "),
-        };
-        format!("{word} {value} {}", parameter.unit).trim_end().to_owned()
+        format!("{} {value} {}", parameter.name(), parameter.unit).trim_end().to_owned()
     }
 
     fn panel_name(&self, panel: usize, first: usize) -> String {

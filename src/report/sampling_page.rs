@@ -41,6 +41,7 @@ impl SampleReport {
             ),
             synthetic: density.provenance.synthetic,
             warnings,
+            app: None,
             sections,
         }
         .html()

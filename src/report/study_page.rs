@@ -53,6 +53,7 @@ impl StudyReport<'_> {
             ),
             synthetic: facts.synthetic,
             warnings,
+            app: None,
             sections: std::iter::once(answer).chain(sections.into_iter().map(Section::folded)).collect(),
         }
         .html()

@@ -6,6 +6,7 @@
 
 pub mod cases;
 pub mod check;
+pub mod explorer;
 pub mod grid;
 pub mod parts;
 pub mod reopen;

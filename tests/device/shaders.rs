@@ -12,7 +12,9 @@ use crate::device::wgsl::{
 use lanesweep::engine::generated::{
     self, ATTEMPTS, ColumnBound, MAX_BOUNDS, MAX_PARAMETERS, NO_SLOT, Recipe, ReducedColumns,
 };
-use lanesweep::engine::gpu::shader::{self, GENERATOR, RANDOM, SHARED, Specialization, TALLY, driver_shader};
+use lanesweep::engine::gpu::shader::{
+    self, GENERATOR, RANDOM, SHARED, Specialization, TALLY, TRACE, TRAFFIC, driver_shader,
+};
 use lanesweep::engine::gpu::{DrawnRecord, Generation, Launch, OutcomeRecord, StartRecord, Tally, exact_spirv};
 use lanesweep::engine::{
     Constants, CountLayout, DeviceScene, EndReason, LaneCase, LaneOther, MotionKind, NO_STEP, Verdicts,
@@ -193,6 +195,42 @@ fn the_generator_has_the_records_the_numbers_and_the_arithmetic_of_its_rust_twin
     assert_eq!((found.forbidden, found.divided_in), (Vec::<String>::new(), vec!["exact_div".to_owned()]));
     let words = exact_spirv(&shader::assemble_generator(), shader::GENERATE, &generator_constants(), false);
     assert!(words.is_ok_and(|w| !w.is_empty()));
+}
+
+/// The kernels of a map's page, which no device of this program runs: a browser joins their sources.
+#[test]
+fn the_kernels_of_the_page_have_the_records_the_entries_and_the_arithmetic_of_the_others() {
+    let [shared, entry] = shader::shared_and_entry();
+    let constants = Constants::resolve(&Profile::load("un-r157").unwrap(), Category::CutOut);
+    for model in ModelId::ALL {
+        let driver = shader::driver_source(model);
+        let lanes = format!("{shared}{entry}{driver}");
+        let traced = format!("{shared}{}{driver}", TRACE.1);
+        for (source, name, values) in [(&lanes, shader::ENTRY, false), (&traced, "trace", true)] {
+            let (module, info) = parse(source);
+            same_records(&module, records());
+            let found = float_operations(&module, &info);
+            assert_eq!((found.forbidden, found.divided_in), (vec![], vec!["exact_div".to_owned()]));
+            assert_eq!(unbounded_loops(&module).1, Vec::<String>::new(), "{model:?}, {name}");
+            let [entry] = module.entry_points.as_slice() else { panic!("one entry point") };
+            assert_eq!((entry.name.as_str(), entry.workgroup_size), (name, [shader::WORKGROUP, 1, 1]));
+            let constants = shader::constants(&constants, model, Specialization { values, ..specialization(true) });
+            assert!(
+                exact_spirv(source, name, &constants, false).is_ok_and(|words| !words.is_empty()),
+                "{model:?}, {name}"
+            );
+        }
+    }
+    let source = shader::assemble_generator() + TRAFFIC.1;
+    let (module, info) = parse(&source);
+    let found = float_operations(&module, &info);
+    assert_eq!((found.forbidden, found.divided_in), (vec![], vec!["exact_div".to_owned()]));
+    for entry in [shader::GENERATE, "mark_traffic"] {
+        assert!(
+            exact_spirv(&source, entry, &generator_constants(), false).is_ok_and(|words| !words.is_empty()),
+            "{entry}"
+        );
+    }
 }
 
 #[test]
@@ -439,7 +477,9 @@ fn the_fragments_of_sampling_do_only_what_devices_agree_on() {
 
 /// Names and texts of the files that pipelines are made of.
 fn shader_files() -> impl Iterator<Item = (&'static str, &'static str)> {
-    SHARED.into_iter().chain(RANDOM).chain(GENERATOR).chain(TALLY).chain(ModelId::ALL.map(driver_shader))
+    let of_the_page = [TRACE, TRAFFIC];
+    let files = SHARED.into_iter().chain(RANDOM).chain(GENERATOR).chain(TALLY).chain(of_the_page);
+    files.chain(ModelId::ALL.map(driver_shader))
 }
 
 #[test]
@@ -461,7 +501,7 @@ fn only_the_entry_has_bindings_and_every_file_stays_short_and_plain() {
         assert!(text.lines().count() <= 600, "{name} is longer than 600 lines");
         assert_eq!(uninitialized_in_loops(text), Vec::<String>::new(), "{name}");
         let code = without_comments(text);
-        if !["lane.wgsl", "generate.wgsl", "tally.wgsl"].contains(&name) {
+        if !["lane.wgsl", "generate.wgsl", "tally.wgsl", "trace.wgsl", "traffic.wgsl"].contains(&name) {
             for word in ["@group", "@binding", "@compute", "var<"] {
                 assert!(!code.contains(word), "{name} has {word}");
             }

@@ -177,6 +177,11 @@ unsafe impl Zeroable for Recipe {}
 unsafe impl Pod for Recipe {}
 
 impl Recipe {
+    /// The record as a device reads it.
+    pub fn words(&self) -> &[u32] {
+        bytemuck::cast_slice(std::slice::from_ref(self))
+    }
+
     /// How the motions follow from a point.
     pub(super) fn path(&self) -> CasePath {
         match self.path {

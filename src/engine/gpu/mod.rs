@@ -14,10 +14,10 @@ mod records;
 mod ring;
 mod scenes;
 mod session;
-pub mod shader;
 mod spirv;
 mod tally;
 
+pub use crate::shader;
 pub use adapters::{AdapterCard, AdapterLimits, Adapters, Api, DeviceKind};
 pub use choice::choose;
 pub use device::{BeforeJob, GpuOptions, Tampering};

@@ -90,6 +90,14 @@ impl MapParameter {
         value / self.per_si
     }
 
+    /// `ego` of a speed, else `lateral speed`: a word for headings.
+    pub fn name(&self) -> String {
+        match self.key.split_once("_speed") {
+            Some((vehicle, _)) => vehicle.to_owned(),
+            None => self.key.rsplit_once('_').map_or(self.key, |(name, _)| name).replace('_', " "),
+        }
+    }
+
     /// `Initial gap (m)`, for axes.
     pub fn title(&self) -> String {
         format!("{} ({})", self.label, self.unit)

@@ -88,14 +88,10 @@ fn assembled(space: &ParameterSpace, points: Points, sizes: &Sizes, profile: &Pr
 fn recipe(space: &ParameterSpace, sizes: &Sizes, profile: &Profile) -> Result<Recipe> {
     let id = space.id();
     let category = id.category;
-    let pair = category == Category::CutOut;
-    let lead = match (pair, sizes.lead) {
-        (true, None) => {
-            let problem = "a cut-out needs the size of the vehicle ahead of the cutting-out one";
-            return Err(Error::input(Place::item(space.id().name()), problem, "fit the density again"));
-        }
-        (_, lead) => lead.unwrap_or(sizes.target),
-    };
+    if category == Category::CutOut && sizes.lead.is_none() {
+        let problem = "a cut-out needs the size of the vehicle ahead of the cutting-out one";
+        return Err(Error::input(Place::item(id.name()), problem, "fit the density again"));
+    }
     let (mut lower, mut upper) = ([f32::MIN; MAX_PARAMETERS], [f32::MAX; MAX_PARAMETERS]);
     for (j, parameter) in space.drawn_parameters().iter().enumerate() {
         if let Some(bound) = parameter.lower {
@@ -105,40 +101,65 @@ fn recipe(space: &ParameterSpace, sizes: &Sizes, profile: &Profile) -> Result<Re
             upper[j] = at_most(bound);
         }
     }
-    let frame = &profile.frame;
-    let half = |a: f64, b: f64| ((a + b) / 2.0) as f32;
     // A kinematic lane change covers one lane, whatever the scenarios' lanes are.
-    let is_reduced = CasePath::of(id) == CasePath::Reduced;
-    let lane_width_m = if is_reduced { sizes.lane_width_m } else { space.options().lane_change_m };
+    let lane_change_m = space.options().lane_change_m;
+    let lane_width_m = if CasePath::of(id) == CasePath::Reduced { sizes.lane_width_m } else { lane_change_m };
     let unlimited = category != Category::Lvd && space.options().after_duration == AfterDuration::Unlimited;
-    let [min_duration, longest_duration] = ParameterSpace::DURATION_RANGE_S;
     Ok(Recipe {
         path: CasePath::of(id) as u32,
         lateral: LateralPath::of(id) as u32,
         dimensions: space.dimensions() as u32,
-        pair: u32::from(pair),
         decelerates: u32::from(space.dimension_of(Variable::MeanDeceleration).is_some()),
         unlimited: u32::from(unlimited),
-        judged: u32::from(!(pair && frame.cut_out_evaluated == CutOutEvaluated::Ahead)),
-        step_cap: profile.step_cap(),
         slots: Variable::ALL.map(|variable| slot(space.dimension_of(variable))),
         columns: columns(space),
         lower,
         upper,
         bounded: space.bounded_columns().len() as u32,
         bounds: bounds(space)?,
+        ..recipe_without_parameters(category, &Sizes { lane_width_m, ..*sizes }, lane_change_m, profile)
+    })
+}
+
+/// The recipe of kinematic cases without parameters: what follows from sizes and profile. The vehicle ahead has the size of
+/// the other one if it has none of its own.
+pub(crate) fn recipe_without_parameters(
+    category: Category,
+    sizes: &Sizes,
+    lane_change_m: f64,
+    profile: &Profile,
+) -> Recipe {
+    let (frame, pair) = (&profile.frame, category == Category::CutOut);
+    let half = |a: f64, b: f64| ((a + b) / 2.0) as f32;
+    let lead = sizes.lead.unwrap_or(sizes.target);
+    let [min_duration, longest_duration] = ParameterSpace::DURATION_RANGE_S;
+    Recipe {
+        path: CasePath::Kinematic as u32,
+        lateral: LateralPath::Centred as u32,
+        dimensions: 0,
+        pair: u32::from(pair),
+        decelerates: 0,
+        unlimited: 0,
+        judged: u32::from(!(pair && frame.cut_out_evaluated == CutOutEvaluated::Ahead)),
+        step_cap: profile.step_cap(),
+        slots: [NO_SLOT; Variable::ALL.len()],
+        columns: no_columns(),
+        lower: [f32::MIN; MAX_PARAMETERS],
+        upper: [f32::MAX; MAX_PARAMETERS],
+        bounded: 0,
+        bounds: [ColumnBound::default(); MAX_BOUNDS],
         min_duration: at_least(min_duration, false),
         longest_duration: at_most(longest_duration),
         dt: frame.dt_s as f32,
         inverse_dt: (1.0 / frame.dt_s) as f32,
-        lane_change: space.options().lane_change_m as f32,
+        lane_change: lane_change_m as f32,
         half_lengths: [half(sizes.ego.length_m, sizes.target.length_m), half(sizes.ego.length_m, lead.length_m)],
         half_widths: [half(sizes.ego.width_m, sizes.target.width_m), half(sizes.ego.width_m, lead.width_m)],
         principal_length: sizes.target.length_m as f32,
         ego_width: sizes.ego.width_m as f32,
-        lane_width: lane_width_m as f32,
+        lane_width: sizes.lane_width_m as f32,
         attention: attention_rules(profile, category).map(|rule| rule.cast()),
-    })
+    }
 }
 
 /// An index in a record of the device.
@@ -178,15 +199,13 @@ fn bounds(space: &ParameterSpace) -> Result<[ColumnBound; MAX_BOUNDS]> {
     Ok(bounds)
 }
 
+/// The columns of a case that is not reduced.
+fn no_columns() -> ReducedColumns {
+    ReducedColumns { lateral: NO_SLOT, lead_speed: NO_SLOT, lead_gap: NO_SLOT, ..ReducedColumns::default() }
+}
+
 fn columns(space: &ParameterSpace) -> ReducedColumns {
-    let (Some(reduction), Some(d)) = (space.reduction(), space.id().coefficients()) else {
-        return ReducedColumns {
-            lateral: NO_SLOT,
-            lead_speed: NO_SLOT,
-            lead_gap: NO_SLOT,
-            ..ReducedColumns::default()
-        };
-    };
+    let (Some(reduction), Some(d)) = (space.reduction(), space.id().coefficients()) else { return no_columns() };
     let series = |series| slot(reduction.series_column(series));
     let number = |variable| slot(reduction.column(variable));
     ReducedColumns {

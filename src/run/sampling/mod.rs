@@ -26,6 +26,7 @@ pub use cheaper_estimator::Choice;
 pub use crude::{Checkpoint, CheckpointRow, CrudeRun};
 pub use estimate_rows::{CarrierRow, EstimateRow, NoTraffic, RecordedRatios, Risk, RiskRate};
 pub use failing_lanes::{FailingLane, Origin};
+pub(crate) use generator::recipe_without_parameters;
 pub use generator::{SAMPLE_PURPOSE, generator_of, generator_of_points};
 pub use limit_state::{LaneLimitState, limit_state, truncated};
 pub use plan::{plan_points, plan_samples};

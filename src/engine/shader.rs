@@ -10,26 +10,26 @@ pub const WORKGROUP: u32 = 64;
 
 /// Fragments that every model shares, in the order in which they are joined.
 pub const SHARED: [(&str, &str); 13] = [
-    ("shared/records.wgsl", include_str!("../../../shaders/shared/records.wgsl")),
-    ("lane.wgsl", include_str!("../../../shaders/lane.wgsl")),
-    ("shared/exact.wgsl", include_str!("../../../shaders/shared/exact.wgsl")),
-    ("shared/motion.wgsl", include_str!("../../../shaders/shared/motion.wgsl")),
-    ("shared/driver.wgsl", include_str!("../../../shaders/shared/driver.wgsl")),
-    ("shared/collision.wgsl", include_str!("../../../shaders/shared/collision.wgsl")),
-    ("shared/ttc.wgsl", include_str!("../../../shaders/shared/ttc.wgsl")),
-    ("shared/btn.wgsl", include_str!("../../../shaders/shared/btn.wgsl")),
-    ("shared/measures.wgsl", include_str!("../../../shaders/shared/measures.wgsl")),
-    ("shared/criteria.wgsl", include_str!("../../../shaders/shared/criteria.wgsl")),
-    ("shared/frame.wgsl", include_str!("../../../shaders/shared/frame.wgsl")),
-    ("shared/fast_forward.wgsl", include_str!("../../../shaders/shared/fast_forward.wgsl")),
-    ("shared/verdicts.wgsl", include_str!("../../../shaders/shared/verdicts.wgsl")),
+    ("shared/records.wgsl", include_str!("../../shaders/shared/records.wgsl")),
+    ("lane.wgsl", include_str!("../../shaders/lane.wgsl")),
+    ("shared/exact.wgsl", include_str!("../../shaders/shared/exact.wgsl")),
+    ("shared/motion.wgsl", include_str!("../../shaders/shared/motion.wgsl")),
+    ("shared/driver.wgsl", include_str!("../../shaders/shared/driver.wgsl")),
+    ("shared/collision.wgsl", include_str!("../../shaders/shared/collision.wgsl")),
+    ("shared/ttc.wgsl", include_str!("../../shaders/shared/ttc.wgsl")),
+    ("shared/btn.wgsl", include_str!("../../shaders/shared/btn.wgsl")),
+    ("shared/measures.wgsl", include_str!("../../shaders/shared/measures.wgsl")),
+    ("shared/criteria.wgsl", include_str!("../../shaders/shared/criteria.wgsl")),
+    ("shared/frame.wgsl", include_str!("../../shaders/shared/frame.wgsl")),
+    ("shared/fast_forward.wgsl", include_str!("../../shaders/shared/fast_forward.wgsl")),
+    ("shared/verdicts.wgsl", include_str!("../../shaders/shared/verdicts.wgsl")),
 ];
 
 /// Fragments of sampling, twins of `src/stats/random`, for a kernel that declares their table: `normal_table:
 /// array<vec4<f32>>` ([`normal_table`](lanesweep_random::normal_table)).
 pub const RANDOM: [(&str, &str); 2] = [
-    ("shared/philox.wgsl", include_str!("../../../shaders/shared/philox.wgsl")),
-    ("shared/normal.wgsl", include_str!("../../../shaders/shared/normal.wgsl")),
+    ("shared/philox.wgsl", include_str!("../../shaders/shared/philox.wgsl")),
+    ("shared/normal.wgsl", include_str!("../../shaders/shared/normal.wgsl")),
 ];
 
 /// Entry point of the generator's pipeline.
@@ -37,14 +37,14 @@ pub const GENERATE: &str = "generate";
 
 /// Fragments of the generator in addition to [`RANDOM`], in the order in which they are joined.
 pub const GENERATOR: [(&str, &str); 8] = [
-    ("shared/records.wgsl", include_str!("../../../shaders/shared/records.wgsl")),
-    ("generate.wgsl", include_str!("../../../shaders/generate.wgsl")),
-    ("shared/exact.wgsl", include_str!("../../../shaders/shared/exact.wgsl")),
-    ("shared/motion.wgsl", include_str!("../../../shaders/shared/motion.wgsl")),
-    ("shared/attention.wgsl", include_str!("../../../shaders/shared/attention.wgsl")),
-    ("shared/recipe.wgsl", include_str!("../../../shaders/shared/recipe.wgsl")),
-    ("shared/points.wgsl", include_str!("../../../shaders/shared/points.wgsl")),
-    ("shared/decode.wgsl", include_str!("../../../shaders/shared/decode.wgsl")),
+    ("shared/records.wgsl", include_str!("../../shaders/shared/records.wgsl")),
+    ("generate.wgsl", include_str!("../../shaders/generate.wgsl")),
+    ("shared/exact.wgsl", include_str!("../../shaders/shared/exact.wgsl")),
+    ("shared/motion.wgsl", include_str!("../../shaders/shared/motion.wgsl")),
+    ("shared/attention.wgsl", include_str!("../../shaders/shared/attention.wgsl")),
+    ("shared/recipe.wgsl", include_str!("../../shaders/shared/recipe.wgsl")),
+    ("shared/points.wgsl", include_str!("../../shaders/shared/points.wgsl")),
+    ("shared/decode.wgsl", include_str!("../../shaders/shared/decode.wgsl")),
 ];
 
 /// Entry point of the pipeline that counts.
@@ -52,13 +52,13 @@ pub const COUNT: &str = "count_samples";
 
 /// Fragments of the counting, in the order in which they are joined.
 pub const TALLY: [(&str, &str); 2] = [
-    ("shared/records.wgsl", include_str!("../../../shaders/shared/records.wgsl")),
-    ("tally.wgsl", include_str!("../../../shaders/tally.wgsl")),
+    ("shared/records.wgsl", include_str!("../../shaders/shared/records.wgsl")),
+    ("tally.wgsl", include_str!("../../shaders/tally.wgsl")),
 ];
 
 /// The source of the counting's pipeline.
 pub fn assemble_tally() -> String {
-    TALLY.iter().fold(format!("const MODELS: u32 = {MODELS}u;\n"), |source, (_, text)| source + text + "\n")
+    joined(TALLY)
 }
 
 /// Defines the list of the models' files from the registry.
@@ -69,7 +69,7 @@ macro_rules! declare_shaders {
             match model {
                 $(ModelId::$model => (
                     concat!(stringify!($file), ".wgsl"),
-                    include_str!(concat!("../../../shaders/", stringify!($file), ".wgsl")),
+                    include_str!(concat!("../../shaders/", stringify!($file), ".wgsl")),
                 ),)+
                 // The session refuses it.
                 ModelId::Foreign(_) => ("", ""),
@@ -93,29 +93,38 @@ fn promises(model: ModelId) -> bool {
 
 /// The source of a model's pipeline: constants of the registry, the shared fragments, the model.
 pub fn assemble(model: ModelId) -> String {
+    joined(SHARED) + &driver_source(model)
+}
+
+/// The part of the source of a model's pipeline that other models do not have.
+pub fn driver_source(model: ModelId) -> String {
     let (_, driver) = driver_shader(model);
-    let mut source = format!("const MODELS: u32 = {MODELS}u;\n");
-    for text in SHARED.iter().map(|(_, text)| *text).chain([driver]) {
-        source.push_str(text);
-        source.push('\n');
-    }
-    if !driver.contains("fn keeps_braking(") {
-        source.push_str(NO_LATCH);
-    }
-    if !promises(model) {
-        source.push_str(NO_PROMISE);
-    }
-    source
+    let latch = if driver.contains("fn keeps_braking(") { "" } else { NO_LATCH };
+    let promise = if promises(model) { "" } else { NO_PROMISE };
+    format!("{driver}\n{latch}{promise}")
 }
 
 /// The source of the generator's pipeline.
 pub fn assemble_generator() -> String {
-    let mut source = format!("const MODELS: u32 = {MODELS}u;\n");
-    for (_, text) in GENERATOR.into_iter().chain(RANDOM) {
-        source.push_str(text);
-        source.push('\n');
-    }
-    source
+    joined(GENERATOR.into_iter().chain(RANDOM))
+}
+
+/// Entry point of lanes that keep their steps.
+pub const TRACE: (&str, &str) = ("trace.wgsl", include_str!("../../shaders/trace.wgsl"));
+
+/// Entry point after the generator that marks impossible traffic.
+pub const TRAFFIC: (&str, &str) = ("traffic.wgsl", include_str!("../../shaders/traffic.wgsl"));
+
+/// The shared source without an entry point, and the entry point of lanes, for a page that joins them itself.
+pub fn shared_and_entry() -> [String; 2] {
+    let is_entry = |(name, _): &(&str, &str)| ["lane.wgsl", "shared/verdicts.wgsl"].contains(name);
+    let (entry, shared): (Vec<_>, Vec<_>) = SHARED.into_iter().partition(is_entry);
+    [joined(shared), entry.into_iter().map(|(_, text)| text).collect()]
+}
+
+/// Files one after the other, after the constants of the registry.
+fn joined(files: impl IntoIterator<Item = (&'static str, &'static str)>) -> String {
+    files.into_iter().fold(format!("const MODELS: u32 = {MODELS}u;\n"), |source, (_, text)| source + text + "\n")
 }
 
 /// Properties that a pipeline is compiled for, in addition to the profile.
