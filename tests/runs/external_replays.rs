@@ -39,7 +39,8 @@ fn s_prime_of_other_programs_and_of_bases_of_other_folds_are_scored() {
     #[cfg(feature = "parquet")]
     {
         write_scenarios(&dir.path().join("as-parquet.parquet"), scenarios_of(8)).unwrap();
-        crate::common::program::ran(dir.path(), "-q study --scenarios scenarios.jsonl --external as-parquet.parquet --out parquet");
+        let study = "-q study --scenarios scenarios.jsonl --external as-parquet.parquet --out parquet";
+        done(dir.path(), &words(study));
         assert!(scores("parquet", "lvd", "as-parquet").iter().all(|f1| f1 == "1"));
     }
 }

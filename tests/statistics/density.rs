@@ -6,7 +6,8 @@ use crate::common::mined::{self, scenarios_of};
 
 use lanesweep::run::sampling::{proposal_from_text, proposal_text};
 use lanesweep::scenario::parameterization::{
-    Parameterization, ParameterizationOptions, Reduction, Sizes, SvdLateral, Variable,
+    Family, Kinematic, LaneChange, Parameterization, ParameterizationOptions, Reduction, Sizes, SpeedProfile,
+    SvdLateral, Variable,
 };
 use lanesweep::scenario::{Case, Category, DataProvenance, Driven, Lateral, Scenario, Side};
 use lanesweep::stats::density::{
@@ -229,6 +230,24 @@ fn the_point_of_a_scenario_gives_the_case_that_the_study_makes_of_it() {
         }
         assert!(compared > 19 * 20, "{compared}");
     }
+}
+
+#[test]
+fn an_instance_that_no_registry_lists_encodes_and_decodes() {
+    let options = ParameterizationOptions::default();
+    let kept = kept(Category::Lvd);
+    let reduction = Reduction::fit(Category::Lvd, &kept, &options).unwrap();
+    let six = Parameterization { category: Category::Lvd, key: "svd-6", family: Family::Svd(6) };
+    let point = six.encode(kept[0], &options, Some(&reduction)).unwrap();
+    assert_eq!(point.len(), six.parameters(&options).len());
+    let decoded = six.decode(&point, &Sizes::of(kept[0]), 0.04, &options, Some(&reduction)).unwrap();
+    assert_eq!(decoded, six.case(kept[0], 0.04, &options, Some(&reduction)).unwrap());
+    assert!(six.encode(kept[0], &options, None).is_err(), "without a decomposition");
+    let decoded = six.decode(&point[1..], &Sizes::of(kept[0]), 0.04, &options, Some(&reduction));
+    assert!(decoded.is_err(), "without a coefficient");
+    let features = Kinematic { speed: SpeedProfile::Constant, lane_change: LaneChange::None };
+    let steady = Parameterization { family: Family::Kinematic(features), ..six };
+    assert!(steady.encode(kept[0], &options, None).is_err(), "an LVD that does not decelerate");
 }
 
 #[test]

@@ -101,9 +101,10 @@ fn number(dice: &mut Dice) -> String {
 /// The reader has its own way through the digits of a short number.
 #[test]
 fn numbers_have_the_bits_that_the_standard_library_reads() {
+    let small = small::Texts::small();
     cases(256, |dice| {
         let texts = dice.list([8, 8], number);
-        let mut tables = small::Texts::small();
+        let mut tables = small.clone();
         let line = tables.tracks.lines().position(|line| line.split(',').nth(1) == Some("5")).unwrap() + 1;
         for (at, text) in texts.iter().enumerate() {
             tables.tracks = small::with_field(&tables.tracks, line + at, "xAcceleration", text);

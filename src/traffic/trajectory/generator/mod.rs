@@ -17,7 +17,7 @@
 //! | `lane_change` | motives (a faster lane, keeping right, letting a close follower pass) and gap acceptance; some drivers let a follower brake and accelerate | 0.24 line crossings per vehicle and km; cut-in THW mode 0.8–1.0 s, bulk 0.5–2.5 s, 4 % below 0.5 s; 362 of 2,992 cut-ins kept, 819 of 3,069 cut-outs |
 //! | `lateral` | quintic lane changes with a mild asymmetry, wander in the lane | duration 2.9–7.3 s, profile close to a quintic |
 //! | `braking` | scheduled hard brakings of one or two phases with an exponential tail | 482 of 20,351 leader decelerations above 2 m/s²; the paper's failure fractions of LVD |
-//! | `options` | the numbers on which failures depend most, fitted by `examples/calibrate_generator` | the paper's 36 failure fractions of S |
+//! | `options` | the numbers on which failures depend most, fitted by `benches/calibrate_generator` | the paper's 36 failure fractions of S |
 //! | `events` | the hazards of lane changes and brakings, and the rate factor | 2,992 cut-ins, 3,069 cut-outs, 482 LVD above 2 m/s² in 109,986 data sets |
 //!
 //! `tests/traffic/generator_calibration.rs` prints these figures beside ours and fails if the difference exceeds its

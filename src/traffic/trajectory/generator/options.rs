@@ -67,7 +67,7 @@ settings! {
     /// How drivers change lanes and brake. Rates and fractions are those at rate factor 1.
     ///
     /// The defaults are fitted to the paper's 36 failure rates of S and to published traffic figures
-    /// (`examples/calibrate_generator`, which also prints what other numbers give); four were then moved by hand.
+    /// (`benches/calibrate_generator`, which also prints what other numbers give); four were then moved by hand.
     /// The fit never saw an F1, a claim of the paper or the seed of the default recordings.
     #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
     #[serde(default, deny_unknown_fields)]
