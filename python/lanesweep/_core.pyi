@@ -131,6 +131,7 @@ def simulate(
     dt: float | None,
     backend: str,
     device: str | None,
+    reference: bool,
     accept_implausible: bool,
     on_message: Callable[[str, str], None] | None = None,
 ) -> tuple[Frame, list[str]]: ...

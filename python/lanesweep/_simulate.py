@@ -66,6 +66,7 @@ def simulate(
     dt: float | None = None,
     backend: str = "auto",
     device: str | int | None = None,
+    reference: bool = False,
     accept_implausible: bool = False,
 ) -> Frame:
     """Run concrete cases against driver models.
@@ -92,6 +93,8 @@ def simulate(
         Time step, s; by default the profile's.
     backend, device : str
         ``"auto"``, ``"cpu"`` or ``"gpu"``, and the name of a device. Results do not depend on them.
+    reference : bool
+        Run in binary64, as `check` and `trace` do, on the CPU and several times slower.
     accept_implausible : bool
         Use physically impossible values with a warning.
 
@@ -99,7 +102,8 @@ def simulate(
     -------
     Frame
         A row per case, headway and model, the last varying fastest: verdicts, minima and maxima, times in s, speeds in m/s. Lanes
-        are in binary32, as in a study; `trace` is in binary64.
+        are in binary32, as in a study. Where `robust` is false, binary64 (`check`, `trace`, ``reference=True``) gives another
+        verdict: the case is within rounding of a limit.
 
     Raises
     ------
@@ -130,6 +134,7 @@ def simulate(
             dt=dt,
             backend=backend,
             device=None if device is None else str(device),
+            reference=reference,
             accept_implausible=accept_implausible,
             on_message=on_message,
         )
@@ -204,18 +209,18 @@ class LimitState(_core.LimitState):
         made._arguments = {"density": os.fspath(density), "model": model, "criterion": criterion, "thw": thw}
         made._arguments |= {"profile": profile, "backend": backend, "device": device}
         made._known_as = known_as
+        made._keep = density
         return made
 
     _arguments: dict[str, Any]
     _known_as: str
+    #: A copy reads the file again, which goes with what gave it.
+    _keep: Any
 
-        made._keep = density
     def __reduce__(self) -> tuple[Any, ...]:
         return functools.partial(LimitState, **self._arguments), ()
 
     def __call__(self, points: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    #: A copy reads the file again, which goes with what gave it.
-    _keep: Any
         array = self._array(points)
         self._check_driver()
         return super().__call__(array) if len(array) else np.empty(0)

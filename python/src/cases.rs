@@ -21,7 +21,7 @@ use lanesweep::run::cases::Cases;
 use lanesweep::scenario::{CaseParameters, CaseQuantity, Category, NamedNumber, Written};
 use lanesweep::support::plain_text::nearest;
 use lanesweep::support::readable::counted;
-use lanesweep::support::table::ArrowRows;
+use lanesweep::support::table::{ArrowRows, ColumnKind};
 use lanesweep::{Error, Place, Result};
 use pyo3::prelude::*;
 
@@ -262,6 +262,7 @@ fn options(
     dt: Option<f64>,
     backend: &str,
     device: Option<&str>,
+    reference: bool,
     accept_implausible: bool,
 ) -> Result<Options> {
     let mut profile = Profile::load(profile)?;
@@ -275,13 +276,20 @@ fn options(
         })
     };
     let models: Vec<ModelId> = models.iter().map(model).collect::<Result<_>>()?;
+    let opened = match reference {
+        true if backend == "gpu" || device.is_some() => {
+            let problem = "binary64 runs on the CPU";
+            return Err(Error::usage(Place::option("reference"), problem, "leave out the device, or `reference`"));
+        }
+        true => OpenBackend::reference(),
+        false => OpenBackend::open(backend.parse()?, device.map(str::parse).transpose()?.as_ref())?,
+    };
     Ok(Options {
         category,
         models: if models.is_empty() { ModelId::ALL.to_vec() } else { models },
         headways: thw.iter().map(|text| headway_of(text)).collect::<Result<_>>()?,
         profile,
-        backend: OpenBackend::open(backend.parse()?, device.map(str::parse).transpose()?.as_ref())?
-            .with_cancel(embedded::token()),
+        backend: opened.with_cancel(embedded::token()),
         implausible: if accept_implausible { Implausible::Accepted } else { Implausible::Refused },
     })
 }
@@ -293,17 +301,18 @@ fn run(rows: Vec<CaseParameters>, first_row: u64, options: &Options, to: &mut Ar
     let outcomes = cases.run(&options.backend.executor())?;
     let plan = cases.lane_plan();
     let per_row = plan.headways.len() * models.len();
-    for (at, outcome) in outcomes.iter().enumerate() {
+    for (at, (outcome, is_robust)) in outcomes.iter().zip(cases.robust(&outcomes)).enumerate() {
         let (row, headway, model) = (at / per_row, at / models.len() % plan.headways.len(), at % models.len());
         let row = first_row + row as u64;
-        to.row(&case_row(row, plan.headways[headway], models[model].name(), outcome, profile.frame.dt_s))?;
+        let lane = (row, plan.headways[headway], models[model].name());
+        to.row(&case_row(lane, outcome, is_robust, profile.frame.dt_s))?;
     }
     Ok(cases.notes)
 }
 
 /// Runs a table of concrete cases. See `lanesweep.simulate`.
 #[pyfunction]
-#[pyo3(signature = (cases, *, category, models, thw, profile, dt, backend, device, accept_implausible, on_message=None))]
+#[pyo3(signature = (cases, *, category, models, thw, profile, dt, backend, device, reference, accept_implausible, on_message=None))]
 #[allow(clippy::too_many_arguments)] // keyword arguments of the Python function
 pub fn simulate(
     py: Python<'_>,
@@ -315,6 +324,7 @@ pub fn simulate(
     dt: Option<f64>,
     backend: String,
     device: Option<String>,
+    reference: bool,
     accept_implausible: bool,
     on_message: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<(Frame, Vec<String>)> {
@@ -324,9 +334,11 @@ pub fn simulate(
         .map_err(|error| input_error(format!("the table cannot be read: {error}")))?;
     watched(py, None, on_message, move || {
         embedded::exclusively(|| {
+            let device = device.as_deref();
             let options =
-                options(category, &models, &thw, &profile, dt, &backend, device.as_deref(), accept_implausible)?;
-            let mut rows = ArrowRows::new(&case_columns(), HashMap::new());
+                options(category, &models, &thw, &profile, dt, &backend, device, reference, accept_implausible)?;
+            let value = if reference { ColumnKind::Binary64 } else { ColumnKind::Binary32 };
+            let mut rows = ArrowRows::new(&case_columns(value), HashMap::new());
             let outcome = rows.schema();
             let mut schema = outcome.clone();
             let (mut frames, mut notes, mut first_row, mut ids) = (Vec::new(), Vec::new(), 0, HashMap::new());
@@ -351,6 +363,8 @@ pub fn simulate(
                 let of_result = carried(&piece, &outcome)?;
                 let times = batch.num_rows() / piece.num_rows().max(1);
                 let (mut fields, mut columns) = (outcome.fields().to_vec(), batch.columns().to_vec());
+                let rows: UInt64Array =
+                    (0..piece.num_rows() as u64).flat_map(|row| std::iter::repeat_n(row, times)).collect();
                 for (name, values) in of_result {
                     columns.push(
                         take(&values, &rows, None)
@@ -366,8 +380,6 @@ pub fn simulate(
                 let rows = counted(missing, "row");
                 format!(
                     "column `speed`: {rows} without a value, the first of them row {first}: the ego's speed is used"
-                let rows: UInt64Array =
-                    (0..piece.num_rows() as u64).flat_map(|row| std::iter::repeat_n(row, times)).collect();
                 )
             }));
             if first_row == 0 {

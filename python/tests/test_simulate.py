@@ -72,6 +72,35 @@ def test_a_row_is_the_case_that_trace_runs() -> None:
         assert row["min_ttc_s"] == pytest.approx(outcome["min_ttc_s"], rel=1e-4)
 
 
+def test_a_case_within_rounding_of_a_limit_is_not_robust_and_the_reference_is_what_trace_says() -> None:
+    # The last is far from any limit.
+    cases = {
+        "ego_speed_mps": [38.69395536938895, 27.421864529919716, 33.6767980294175, 29.00674810658949, 30.0],
+        "speed_mps": [24.483329487285424, 15.197090112295333, 19.587822472628055, 17.119653931908772, 20.0],
+        "gap": [30.462145330837288, 24.120127121291684, 58.47113429192097, 46.32344642788733, 40.0],
+        "lateral_speed": [1.692366964456078, 1.0969398616077397, 1.2827202148940062, 1.87297914513876, 1.0],
+    }
+    ours, reference = (lanesweep.simulate(cases, category="cut-in", models=["FSM", "CCHDM"], reference=of) for of in (False, True))
+    differs = np.any([ours[name] != reference[name] for name in ("collision", "ttc", "btn")], axis=0)
+    assert differs.tolist() == [True, False, True, False, False, True, False, True, False, False]
+    assert np.array_equal(ours["robust"], ~differs) and reference["robust"].all()
+    for at, model in ((0, "FSM"), (2, "CCHDM")):
+        case = {name.removesuffix("_mps"): f"{values[at]!r}{'m' if name == 'gap' else 'm/s'}" for name, values in cases.items()}
+        traced = lanesweep.trace(category="cut-in", models=model, **case).table("lanes")
+        for name in ("collision", "ttc", "btn", "min_ttc_s", "min_gap_m", "end_s"):
+            assert traced[name][0] == reference[name][2 * at + (model == "CCHDM")], name
+    rng = np.random.default_rng(1)
+    ranges = {"ego_speed_mps": (15, 40), "speed_mps": (10, 35), "gap": (2, 80), "lateral_speed": (0.3, 2.5)}
+    many = {name: rng.uniform(*ends, 5000) for name, ends in ranges.items()}
+    ours, reference = (lanesweep.simulate(many, category="cut-in", reference=of) for of in (False, True))
+    differs = np.any([ours[name] != reference[name] for name in ("collision", "ttc", "btn")], axis=0)
+    assert np.array_equal(ours["robust"], ~differs)
+    with pytest.raises(lanesweep.UsageError, match="reference"):
+        lanesweep.simulate(CASES, category="cut-in", reference=True, backend="gpu")
+    with pytest.raises(lanesweep.UsageError, match="Reg157-numpy"):
+        lanesweep.simulate(CASES, category="cut-in", reference=True, models=[lanesweep.drivers.Reg157()])
+
+
 def test_headways_for_all_cases_and_mixed_categories_keep_the_order() -> None:
     table = {
         "category": ["lvd", "cut-in", "lvd"],

@@ -152,24 +152,31 @@ pub(crate) fn outcome_record(outcome: &Outcome<f64>, dt_s: f64) -> Map<String, V
     OUTCOME.iter().map(|&(name, .., of)| (name.to_owned(), value(of))).collect()
 }
 
-/// The columns of [concrete cases](lanesweep_run::cases), in their order.
+/// The columns of [concrete cases](lanesweep_run::cases), in their order; `value` as in [`columns`].
 #[rustfmt::skip] // a table: one line per column
-pub fn case_columns() -> Vec<Column> {
+pub fn case_columns(value: ColumnKind) -> Vec<Column> {
     let c = Column::new;
     let mut columns = vec![
         c("case", ColumnKind::Whole, "1", "Row of the case, from 0."),
         c("headway", ColumnKind::Name, "", "Initial time headway or gap with its unit; null where each case has its own."),
         c("model", ColumnKind::Name, "", "Driver model."),
     ];
-    columns.extend(outcome_columns(ColumnKind::Binary32));
+    columns.extend(outcome_columns(value));
+    columns.push(c("robust", ColumnKind::Flag, "", "Binary64, the arithmetic of `check` and `trace`, gives the same verdicts; null for drivers of one's own."));
     columns
 }
 
 /// A row of [`case_columns`].
-pub fn case_row<'a>(case: u64, headway: Headway, model: &'a str, outcome: &Outcome<f64>, dt_s: f64) -> Vec<Cell<'a>> {
+pub fn case_row<'a>(
+    (case, headway, model): (u64, Headway, &'a str),
+    outcome: &Outcome<f64>,
+    is_robust: Option<bool>,
+    dt_s: f64,
+) -> Vec<Cell<'a>> {
     let headway = (headway != Headway::Observed).then(|| headway.to_string());
     let mut row = vec![Cell::Whole(case as i64), headway.map_or(Cell::Null, Cell::text), Cell::text(model)];
     row.extend(outcome_cells(outcome, dt_s));
+    row.push(is_robust.map_or(Cell::Null, Cell::Flag));
     row
 }
 
