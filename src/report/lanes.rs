@@ -141,7 +141,7 @@ pub(super) fn outcome_cells(outcome: &Outcome<f64>, dt_s: f64) -> [Cell<'static>
 pub(crate) fn with_outcomes<'t>(mut table: Table, traces: impl IntoIterator<Item = &'t Trace>) -> Table {
     table.columns.extend(outcome_columns(ColumnKind::Binary64));
     for (row, trace) in table.rows.iter_mut().zip(traces) {
-        row.extend(outcome_cells(&trace.outcome, trace.dt_s).into_iter());
+        row.extend(outcome_cells(&trace.outcome, trace.dt_s));
     }
     table
 }
