@@ -30,6 +30,7 @@ from .options import (
 
 __all__ = [
     "check",
+    "devices",
     "fit",
     "map",
     "merge",
@@ -758,3 +759,28 @@ def merge(
     Result
     """
     return run("merge", locals())
+
+
+def devices(
+    *,
+    config: Config | None = None,
+    threads: Int | None = None,
+) -> Result:
+    """List the compute devices and the one that is used.
+
+    Each device of each driver, by name, interface and PCI bus id, and whether it has the exact path; then what
+    `--backend auto` selects: the first GPU, discrete before virtual before integrated, never software.
+
+    Parameters
+    ----------
+    config : Config
+        Configuration file, or one key of it. `lanesweep config init` writes such a file. Without `config`,
+        LANESWEEP_CONFIG names it.
+    threads : Int
+        Threads; results do not depend on it, by default all cores.
+
+    Returns
+    -------
+    Result
+    """
+    return run("devices", locals())

@@ -81,20 +81,16 @@ impl PythonDriver {
 
     /// Calls `acceleration`.
     fn decide(&self, state: &Py<PyAny>, columns: &LaneColumns, rows: Vec<f32>, decided: &mut [f32]) -> Result<()> {
-        let step = columns.step;
-        attached(|py| {
-            let found = (|| -> PyResult<()> {
-                let rows = PyArray1::from_vec(py, rows);
-                let lane = PyArray1::from_slice(py, &columns.lane);
-                let time_s = f64::from(step) * columns.dt_s;
-                let found = py.import("lanesweep._driver")?;
-                let found = found.call_method1("decided", (&self.driver, state, step, time_s, lane, rows))?;
-                let found: PyReadonlyArray1<'_, f32> = found.extract()?;
-                decided.copy_from_slice(found.as_slice()?);
-                Ok(())
-            })();
-            found.map_err(|raised| self.failed(py, &format!("step {step}"), raised))
-        })
+        let ask = |py: Python<'_>| -> PyResult<()> {
+            let (rows, lane) = (PyArray1::from_vec(py, rows), PyArray1::from_slice(py, &columns.lane));
+            let (step, time_s) = (columns.step, f64::from(columns.step) * columns.dt_s);
+            let module = py.import("lanesweep._driver")?;
+            let found = module.call_method1("decided", (&self.driver, state, step, time_s, lane, rows))?;
+            let found: PyReadonlyArray1<'_, f32> = found.extract()?;
+            decided.copy_from_slice(found.as_slice()?);
+            Ok(())
+        };
+        attached(|py| ask(py).map_err(|raised| self.failed(py, &format!("step {}", columns.step), raised)))
     }
 }
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from lanesweep import _core
 
-FUNCTIONS = ["study", "tracks", "mine", "fit", "sample", "map", "check", "trace", "merge"]
+FUNCTIONS = ["study", "tracks", "mine", "fit", "sample", "map", "check", "trace", "merge", "devices"]
 #: Types of arguments, by their names.
 NAMES = {
     "categories": "Categories", "category": "Category", "compare": "Keys | bool", "config": "Config", "criterion": "Criterion",

@@ -93,10 +93,11 @@ impl Cases {
     }
 }
 
-/// Whether a verdict is within 1 cm or 0.5 m/s of a contact, or within a thousandth of a threshold. Among 4.8 million random
-/// cut-ins, verdicts of binary64 differed within 0.1 mm, 0.12 m/s and 2e-5.
+/// Whether a verdict is within 1 cm or 0.5 m/s of a contact, or within 2 % of a threshold. Six of 6.4 million random cut-ins
+/// within 10 cm, 1.5 m/s or 1 % had other verdicts in binary64: at most 0.1 mm, 0.12 m/s and 0.8 % away. Of 400,000 that were
+/// not chosen, none had.
 fn is_near_a_limit(outcome: &Outcome<f64>, profile: &Profile) -> bool {
-    let near = |value: f64, limit: f64| (value - limit).abs() <= 0.001 * limit;
+    let near = |value: f64, limit: f64| (value - limit).abs() <= 0.02 * limit;
     let of_contact =
         if outcome.contact == Contact::None { outcome.min_gap < 0.01 } else { outcome.impact_closing_speed < 0.5 };
     let criteria = &profile.criteria;

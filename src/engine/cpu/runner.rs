@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use crate::cpu::foreign::{Setting, run_lanes};
 use crate::cpu::lane_result::Ending;
 use crate::cpu::pending_lanes::Lanes;
-use crate::cpu::series::Series;
+use crate::cpu::series::{Series, max_entries};
 use crate::cpu::simd::Instructions;
 use crate::drivers::Constants;
 use crate::frame::Start;
@@ -23,6 +23,10 @@ use lanesweep_model::driver::{ModelId, VectorDriver};
 use lanesweep_model::scalar::Real;
 use lanesweep_model::scenario::Tables;
 use lanesweep_support::Result;
+
+/// Maximum number of entries of the unrolled motions of a batch side by side, 512 MiB, if every motion lasts as long as
+/// its lane.
+const SIDE_BY_SIDE_ENTRIES: u64 = 1 << 27;
 
 /// Runs lanes of a plan one by one, in the arithmetic `R`.
 pub struct LaneRunner<'p, R> {
@@ -185,14 +189,15 @@ impl LaneRunner<'_, f32> {
         let of_block = &plan.blocks[block];
         let variants = of_block.variants.len();
         let keys: Vec<_> = units.flat_map(|unit| (0..variants).map(move |variant| (unit, variant))).collect();
-        let batch_cases = (driver.batch_lanes() / self.starts.len().max(1)).max(1);
+        let step_cap = plan.profile.step_cap();
+        let memory = SIDE_BY_SIDE_ENTRIES / (2 * max_entries(step_cap));
+        let batch_cases = (driver.batch_lanes() / self.starts.len().max(1)).min(memory as usize).max(1);
         let batch = |(at, keys): (usize, &[(u64, usize)])| {
             let mut tables = Tables::default();
             let case = |&(unit, variant): &_| self.case_with_series(block, unit, variant, &mut tables);
             let cases: Vec<LaneCase<f32>> = keys.iter().map(case).collect();
             let mut series = Series::default();
-            let tracks: Vec<_> =
-                cases.iter().map(|case| series.unroll(case, &tables, plan.profile.step_cap())).collect();
+            let tracks: Vec<_> = cases.iter().map(|case| series.unroll(case, &tables, step_cap)).collect();
             drop(tables);
             run_lanes(&setting, &cases, (&tracks, series.entries()), &self.starts, |lane| {
                 let (case, headway) = (at * batch_cases + lane / self.starts.len(), lane % self.starts.len());
@@ -200,7 +205,11 @@ impl LaneRunner<'_, f32> {
                 format!("{unit}/{}/{}/{}", of_block.variants[case % variants], plan.headways[headway], model.name())
             })
         };
-        let outcomes: Result<Vec<_>> = keys.par_chunks(batch_cases).enumerate().map(batch).collect();
+        let outcomes: Result<Vec<_>> = if driver.batch_lanes() == usize::MAX {
+            keys.chunks(batch_cases).enumerate().map(batch).collect()
+        } else {
+            keys.par_chunks(batch_cases).enumerate().map(batch).collect()
+        };
         Ok(outcomes?.concat())
     }
 }

@@ -72,7 +72,8 @@ pub trait VectorDriver: Send + Sync {
     /// Whether the driver may accelerate. Lanes then run to a contact or the time cap; otherwise they also end once no
     /// further event is possible, like those of the built-in drivers.
     fn may_accelerate(&self) -> bool;
-    /// Maximum number of lanes of a batch. Batches run in threads, each with a function of its own.
+    /// Maximum number of lanes of a batch. Batches run in threads, each with a function of its own; without a maximum, one
+    /// after the other.
     fn batch_lanes(&self) -> usize {
         usize::MAX
     }
