@@ -207,7 +207,7 @@ impl Page {
             .iter()
             .enumerate()
             .map(|(at, section)| {
-                let contents = if at == 0 { self.contents() } else { String::new() };
+                let contents = if at == 0 && self.app.is_none() { self.contents() } else { String::new() };
                 format!("\n<section id=\"{}\">{}{contents}\n</section>", Escaped(&section.id), section.html())
             })
             .collect();

@@ -8,7 +8,6 @@ use lanesweep_model::criterion::Criterion;
 use lanesweep_model::profile::Profile;
 use lanesweep_run::grid::{CaseStyle, CellOutcome, MappedGrid};
 use lanesweep_support::Result;
-use lanesweep_support::readable::count;
 use lanesweep_support::run_folder::{ResultFiles, Results};
 
 /// A figure with more bytes is a file only.
@@ -68,13 +67,7 @@ impl MapReport {
         let print = Section::new("figure", "Figure to print").figures(figure.filter(is_short)).folded();
         let page = Page {
             title: "Outcomes over a grid".to_owned(),
-            lead: format!(
-                "{} {} simulations: {} over a grid of parameters, profile {}.",
-                self.sentence(),
-                count(self.simulations()),
-                self.criterion.label(),
-                self.profile.name
-            ),
+            lead: format!("{}.", self.caption()),
             app: Some(self.explorer()?),
             sections: vec![print, self.host.section(&self.profile).folded()],
             ..Page::default()
