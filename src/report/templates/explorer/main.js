@@ -28,7 +28,7 @@ async function update(isMoving = false) {
       const [milliseconds, cells] = [Math.round(performance.now() - began), shownMap.nx * shownMap.ny];
       if (!isProgram) { millisecondsPerCell = milliseconds / cells; }
       Object.assign(document.body.dataset, { drawn: milliseconds, agreement: agreement(shownMap) });
-      $("time").textContent = isProgram ? "Computed by the program that wrote this page."
+      $("time").textContent = isProgram ? `Computed by the program that wrote this page.${isComputable(data.panels[state.panel]) ? "" : " The page does not make cases of this kind: sliders show plain ones."}`
         : `${cells} cells × ${data.drivers.length} drivers, computed here in ${milliseconds} ms${adapterName ? ` on ${adapterName}` : ""}. ${agreement(shownMap)}`;
     }
     if (state.at && shownMap?.isLive) { await showCase(...state.at); }
@@ -114,7 +114,6 @@ function buildControls() {
   $("sliders").replaceChildren(...sliderParameters().map(slider));
   document.querySelectorAll(".ex-live, #ex-kind, #ex-profile").forEach((part) => { part.disabled = !device; });
 }
-
 function slider(parameter) {
   const { key, from, to, step, label, unit, follows, start } = parameter;
   const is = { min: from, max: to, disabled: isFollowing(key) };
@@ -173,7 +172,6 @@ function listen() {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
   addEventListener("hashchange", () => { if (fromAddress()) { buildControls(); update(); } });
 }
-
 async function start() {
   try { await openDevice(); } catch (error) { device = null; }
   if (!fromAddress()) {

@@ -39,7 +39,10 @@ function programMap(at) {
   const outcome = (driver, cell, criterion = state.criterion) => grid.runs[criterion][driver][panel * nx * ny + cell];
   const fails = (of) => of === OUTCOME.Fail || of === OUTCOME.FailByReaction;
   const bits = (driver, cell) => data.criteria.reduce((sum, { key, bit }) => sum | (fails(outcome(driver, cell, key)) << bit), 0);
-  return { nx, ny, x: grid.x, y: grid.y, xs: grid.x.values, ys: grid.y.values, names: grid.models, bits, outcome, isPossible: (cell) => outcome(0, cell) !== OUTCOME.NoTraffic };
+  const references = data.settings.find(({ profile }) => profile === data.profiles[0])?.references ?? [];
+  const notPreventable = (cell) => references.every((name) => outcome(grid.models.indexOf(name), cell, "collision") === OUTCOME.Fail);
+  return { nx, ny, x: grid.x, y: grid.y, xs: grid.x.values, ys: grid.y.values, names: grid.models, bits, outcome, isPossible: (cell) => outcome(0, cell) !== OUTCOME.NoTraffic,
+    references, notPreventable: references.length && references.every((name) => grid.models.includes(name)) ? notPreventable : null };
 }
 // `coarse`: fewer cells. If the initial distance is on an axis, its values are the starts of the other axis' cases.
 async function deviceMap(coarse) {
@@ -62,11 +65,10 @@ async function deviceMap(coarse) {
     if (!isCollision || unreacting(cell) & 1) { return fails ? OUTCOME.Fail : OUTCOME.Pass; }
     return fails ? OUTCOME.FailByReaction : OUTCOME.NoConflict;
   };
-  const at = setting.references.map((name) => names.indexOf(name));
-  const allCollide = (cell) => isPossible(cell) && (unreacting(cell) & 1) === 1 && at.every((driver) => bits(driver, cell) & 1);
-  const notPreventable = at.length ? allCollide : null;
+  const { references } = setting;
+  const allCollide = (cell) => isPossible(cell) && (unreacting(cell) & 1) === 1 && references.every((name) => bits(names.indexOf(name), cell) & 1);
   const isCase = (cell) => impossible(laneOf(cell)) !== 2;
-  return { nx, ny, x: parameterOf(x.key), y: parameterOf(y.key), xs, ys, names, bits, outcome, isPossible, isCase, notPreventable, references: setting.references, isLive: true };
+  return { nx, ny, x: parameterOf(x.key), y: parameterOf(y.key), xs, ys, names, bits, outcome, isPossible, isCase, references, notPreventable: references.length ? allCollide : null, isLive: true };
 }
 // What a map of the device and the program's map of the same cells have in common.
 function agreement(map) {
