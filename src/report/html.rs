@@ -29,11 +29,6 @@ pub struct PageFigure {
 }
 
 impl PageFigure {
-    /// Its size in the page.
-    pub(crate) fn bytes(&self) -> usize {
-        self.svg.len()
-    }
-
     /// From a complete SVG document.
     pub(crate) fn new(svg: &str, files: &[&str]) -> PageFigure {
         let (svg, width_px) = inline(svg);
@@ -207,7 +202,7 @@ impl Page {
             .iter()
             .enumerate()
             .map(|(at, section)| {
-                let contents = if at == 0 && self.app.is_none() { self.contents() } else { String::new() };
+                let contents = if at == 0 { self.contents() } else { String::new() };
                 format!("\n<section id=\"{}\">{}{contents}\n</section>", Escaped(&section.id), section.html())
             })
             .collect();
