@@ -29,11 +29,6 @@ pub(crate) struct PageFigure {
 }
 
 impl PageFigure {
-    /// Its size in the page.
-    pub(crate) fn bytes(&self) -> usize {
-        self.svg.len()
-    }
-
     /// From a complete SVG document.
     pub(crate) fn new(svg: &str, files: &[&str]) -> PageFigure {
         let (svg, width_px) = inline(svg);

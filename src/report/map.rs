@@ -1,18 +1,14 @@
 //! The files, sheets and page of a `map` run. Tables are in `map_tables.rs`, `map.json` in `map_record.rs`.
 
 use super::host::{Host, SweepRecord};
-use super::html::{Page, PageFigure, Section};
+use super::html::Page;
 use super::map_sheet::MapSheet;
 use super::records::publish;
 use lanesweep_model::criterion::Criterion;
 use lanesweep_model::profile::Profile;
 use lanesweep_run::grid::{CaseStyle, CellOutcome, MappedGrid};
 use lanesweep_support::Result;
-use lanesweep_support::readable::count;
-use lanesweep_support::run_folder::{ResultFiles, Results};
-
-/// A figure with more bytes is a file only.
-const MAX_FIGURE_BYTES: usize = 100_000;
+use lanesweep_support::run_folder::{FIGURES, ResultFiles, Results};
 
 /// A complete run.
 pub struct MapReport {
@@ -46,37 +42,27 @@ impl MapReport {
     /// # Errors
     /// [`lanesweep_support::Error::Io`] if the folder cannot be written to.
     pub fn write(&self, mut results: Results) -> Result<ResultFiles> {
-        let mut figure = None;
         let outcomes = self.shown_outcomes();
         for mapped in &self.grids {
             let not_preventable = self.not_preventable(mapped);
             for (at, model) in mapped.map.models.iter().enumerate() {
                 let svg = self.sheet(mapped, at, &outcomes, not_preventable.clone());
-                let name = format!("{}_{}", mapped.plan.grid.name, slug(model.name()));
-                let added = PageFigure::add_svg(&mut results, &name, &svg, "cells.csv")?;
-                figure.get_or_insert(added);
+                let name = format!("{FIGURES}{}_{}.svg", mapped.plan.grid.name, slug(model.name()));
+                results.add(&name, svg.as_bytes())?;
             }
         }
-        results.add("report.html", self.html(figure)?.as_bytes())?;
+        results.add("report.html", self.html()?.as_bytes())?;
         results.add_table("cells.csv", self.cells())?;
         publish(results, |files| self.json(files))
     }
 
-    /// Renders the run as one page: the explorer, and a figure to print.
-    fn html(&self, figure: Option<PageFigure>) -> Result<String> {
-        let is_short = |figure: &PageFigure| figure.bytes() <= MAX_FIGURE_BYTES;
-        let print = Section::new("figure", "Figure to print").figures(figure.filter(is_short)).folded();
+    /// Renders the run as one page, which computes further maps.
+    fn html(&self) -> Result<String> {
         let page = Page {
             title: "Outcomes over a grid".to_owned(),
-            lead: format!(
-                "{} {} simulations: {} over a grid of parameters, profile {}.",
-                self.sentence(),
-                count(self.simulations()),
-                self.criterion.label(),
-                self.profile.name
-            ),
+            lead: format!("{}.", self.caption()),
             app: Some(self.explorer()?),
-            sections: vec![print, self.host.section(&self.profile).folded()],
+            sections: vec![self.host.section(&self.profile).folded()],
             ..Page::default()
         };
         Ok(page.html())

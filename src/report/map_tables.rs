@@ -25,21 +25,6 @@ impl MapReport {
         )
     }
 
-    /// The fractions of the first maps in a sentence.
-    pub(super) fn sentence(&self) -> String {
-        const SHOWN: usize = 2;
-        let of_map = |mapped: &MappedGrid| {
-            let share = |(at, model): (usize, &ModelId)| {
-                format!("{} in {:.2} %", model.name(), 100.0 * mapped.map.share(at, self.criterion))
-            };
-            let shares: Vec<String> = mapped.map.models.iter().enumerate().map(share).collect();
-            format!("{}: {}", mapped.plan.grid.name, shares.join(", "))
-        };
-        let maps: Vec<String> = self.grids.iter().take(SHOWN).map(of_map).collect();
-        let more = if self.grids.len() > SHOWN { "; …" } else { "" };
-        format!("Of the cells with possible traffic fail {}: {}{more}.", self.criterion.label(), maps.join("; "))
-    }
-
     /// Fractions as a table.
     pub(super) fn shares(&self) -> Table {
         let any_known = self.grids.iter().any(|mapped| mapped.known_percent.iter().any(Option::is_some));

@@ -25,8 +25,8 @@ struct Slider {
     key: String,
     from: f64,
     to: f64,
-    /// Of an initial distance: the kind of the device's start.
-    start: Option<u32>,
+    /// The [`Variable`] of a point that it gives; `None` for an initial distance.
+    variable: Option<String>,
 }
 
 /// A kind of case: the parameters of a kinematic parameterization.
@@ -106,20 +106,6 @@ fn flag(parameter: &MapParameter) -> String {
     parameter.quantity.number().key.replace('_', "-")
 }
 
-/// The number of a point that a quantity gives.
-fn variable(quantity: CaseQuantity) -> Option<Variable> {
-    Some(match quantity {
-        CaseQuantity::EgoSpeed => Variable::EgoSpeed,
-        CaseQuantity::OtherSpeed => Variable::TargetSpeed,
-        CaseQuantity::LateralSpeed => Variable::LateralSpeed,
-        CaseQuantity::Deceleration => Variable::MeanDeceleration,
-        CaseQuantity::EndSpeed => Variable::FinalSpeed,
-        CaseQuantity::AheadSpeed => Variable::LeadSpeed,
-        CaseQuantity::AheadGap => Variable::LeadGap,
-        _ => return None,
-    })
-}
-
 /// The pipelines of a profile's lanes of a kind, and what is known of them.
 fn setting(profile: &Profile, kind: &Kind, category: Category, sliders: &[Slider], sizes: &Point) -> Result<Value> {
     let generator = generator(profile, kind, category, sliders, sizes)?;
@@ -168,14 +154,12 @@ fn generator(
     let (mut slots, mut lower) = ([NO_SLOT; Variable::ALL.len()], [0.0; MAX_PARAMETERS]);
     let mut points = vec![Vec::new(); 2 + KNOWN_CASES];
     let of_kind = kind.parameters.iter().filter_map(|key| sliders.iter().find(|slider| slider.key == *key));
-    for (at, slider) in of_kind.filter(|slider| slider.start.is_none()).enumerate() {
+    for (at, slider) in of_kind.filter(|slider| slider.variable.is_some()).enumerate() {
         let parameter = MapParameter::find(category, &slider.key, "page")?;
-        if let Some(variable) = variable(parameter.quantity) {
-            slots[variable as usize] = at as u32;
-        }
-        if matches!(parameter.quantity, CaseQuantity::LateralSpeed | CaseQuantity::Deceleration) {
-            lower[at] = f32::MIN_POSITIVE;
-        }
+        let variable = Variable::ALL.iter().position(|known| slider.variable == Some(format!("{known:?}")));
+        slots[variable.ok_or_else(|| Error::Internal(format!("no variable of {}", slider.key)))?] = at as u32;
+        // A speed across the road and a deceleration divide.
+        lower[at] = if slider.from > 0.0 { f32::MIN_POSITIVE } else { 0.0 };
         // An end speed is below the initial speed as a rule.
         let most = if parameter.quantity == CaseQuantity::EndSpeed { 0.3 } else { 1.0 };
         for (case, point) in points.iter_mut().enumerate() {

@@ -233,6 +233,36 @@ fn the_kernels_of_the_page_have_the_records_the_entries_and_the_arithmetic_of_th
     }
 }
 
+/// A browser refuses a pipeline without a constant, or with one that its source does not have.
+#[test]
+fn the_page_has_every_constant_of_its_kernels_under_every_profile() {
+    let profiles: Vec<Profile> = Profile::names().map(|name| Profile::load(name).unwrap()).collect();
+    let data = lanesweep::run::explorer::explorer(&profiles, &[]).unwrap();
+    let overrides = |source: &str| -> BTreeSet<String> {
+        parse(source).0.overrides.iter().map(|(_, of)| of.name.clone().unwrap()).collect()
+    };
+    let names = |of: &serde_json::Value| -> Vec<String> { of.as_object().unwrap().keys().cloned().collect() };
+    let (text, generator) = (|part: &str| data["source"][part].as_str().unwrap(), data["source"]["generator"].as_str());
+    let declared = ModelId::ALL
+        .map(|model| overrides(&format!("{}{}{}", text("shared"), text("lanes"), shader::driver_source(model))));
+    let generator = overrides(generator.unwrap());
+    let settings = data["settings"].as_array().unwrap();
+    // Five kinds of case; the profile whose cut-outs begin at the exposure has three.
+    assert_eq!(settings.len(), 5 * profiles.len() - 2);
+    for setting in settings {
+        let drivers = setting["drivers"].as_array().unwrap();
+        assert_eq!(drivers.len(), MODELS + 1);
+        for (own, declared) in drivers.iter().zip(declared.iter().chain([&declared[0]])) {
+            let all: Vec<String> = names(&setting["shared"]).into_iter().chain(names(own)).collect();
+            assert_eq!(all.len(), declared.len(), "no constant twice");
+            assert_eq!(&all.into_iter().collect::<BTreeSet<_>>(), declared, "{}", setting["profile"]);
+        }
+        assert_eq!(names(&setting["generator"]).into_iter().collect::<BTreeSet<_>>(), generator);
+        assert_eq!(setting["recipe"].as_array().unwrap().len() * 4, size_of::<Recipe>());
+        assert_eq!(setting["known"]["hashes"].as_array().unwrap().len(), MODELS);
+    }
+}
+
 #[test]
 fn the_counting_has_the_records_and_the_places_of_its_rust_twins() {
     let source = shader::assemble_tally();

@@ -292,6 +292,37 @@ fn the_same_files_come_from_any_number_of_threads() {
     }
 }
 
+/// The page holds the cells of cells.csv in run lengths, for browsers that compute none.
+#[test]
+fn the_page_has_the_outcome_of_every_cell_and_stays_small() {
+    let dir = tempfile::tempdir().unwrap();
+    ran(dir.path(), "-q map cut-out --preset r157 --models CCHDM,FSM --robust --out .");
+    let html = std::fs::read_to_string(dir.path().join("report.html")).unwrap();
+    assert!(html.len() < 500_000, "{} bytes", html.len());
+    let (_, data) = html.split_once("id=\"explorer-data\">").unwrap();
+    let data: serde_json::Value = serde_json::from_str(data.split_once("</script>").unwrap().0).unwrap();
+    let rows = table(&dir.path().join("cells.csv"));
+    for grid in data["grids"].as_array().unwrap() {
+        for (model, runs) in
+            grid["models"].as_array().unwrap().iter().zip(grid["outcomes"]["collision"].as_array().unwrap())
+        {
+            let (mut words, mut count) = (Vec::new(), String::new());
+            for letter in runs.as_str().unwrap().chars() {
+                if letter.is_ascii_digit() {
+                    count.push(letter);
+                    continue;
+                }
+                let word = data["outcomes"][letter as usize - 'a' as usize]["label"].as_str().unwrap();
+                let times = if count.is_empty() { 1 } else { count.parse().unwrap() };
+                words.extend(std::iter::repeat_n(word, times));
+                count.clear();
+            }
+            let own = rows.iter().filter(|row| grid["name"] == *row["map"] && *model == *row["model"]);
+            assert_eq!(words, own.map(|row| row["outcome"].as_str()).collect::<Vec<_>>(), "{model}");
+        }
+    }
+}
+
 #[test]
 fn what_makes_no_map_is_answered_with_what_would() {
     // X, Y and S: good axes and the speed of the ego.

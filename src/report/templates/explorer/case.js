@@ -9,7 +9,6 @@ function sentence(name, { bits, contact, reaction, end, impact, closing, ttc, bt
   const near = Number.isFinite(ttc) ? `smallest TTC ${seconds(ttc)}${bits & 2 ? ` (fails: below ${thresholds.ttc} s)` : ""}` : "no TTC";
   return `${name} ${reacts} ${ends}; ${near}, largest BTN ${Number.isFinite(btn) ? btn.toFixed(2) : "infinite"}${bits & 4 ? ` (fails: above ${thresholds.btn}, or a contact)` : ""}.`;
 }
-
 // The answer as `check` computes it, before it examines how robust it is.
 function answerOf({ references, settles }, unreacting, collides) {
   const avoiding = references.filter((name) => !collides(name));
@@ -17,10 +16,9 @@ function answerOf({ references, settles }, unreacting, collides) {
   if (!(unreacting & 1)) { return unreacting & 8 && settles ? "Undecided: the run ends before anything happens." : "No conflict: nothing collides even if the ego never reacts."; }
   return avoiding.length ? `Preventable: ${avoiding.join(" and ")} ${avoiding.length > 1 ? "avoid" : "avoids"} the collision.` : `Not preventable: ${references.join(" and ")} collide.`;
 }
-
 // The case of these values on the axes: the numbers of its point, and its start.
 function caseAt(x, y) {
-  const valueAt = (key) => (key === state.x.key ? x : key === state.y.key ? y : valueOf(key));
+  const valueAt = (key) => valueOf(key, { [state.x.key]: x, [state.y.key]: y });
   const points = new Float32Array(kindOf().parameters.filter(({ start }) => start === null).map(({ key, perSi }) => valueAt(key) / perSi));
   const { key, start, perSi } = parameterOf(startKey());
   return { points, starts: [[start, valueAt(key) / perSi]], valueAt };
@@ -31,7 +29,6 @@ function commandOf({ valueAt }) {
   const flags = given.map(({ key, flag, suffix, sign }) => `--${flag} ${decimal(sign * valueAt(key))}${suffix}`);
   return ["lanesweep check --category", kindOf().category, ...flags, ...data.sizes, `--profiles ${state.profile}`].join(" ");
 }
-
 // The steps that a lane wrote. TTC and BTN are those of the vehicles that the criteria evaluate.
 function readSteps(setting, bytes, lastStep) {
   const [values, words] = [new Float32Array(bytes), new Uint32Array(bytes)];
@@ -41,10 +38,9 @@ function readSteps(setting, bytes, lastStep) {
       { v: values[of], gap: values[of + 1], lateral: values[of + 2], ttc: values[of + 4], btn: btnOf(setting, values[of + 5], values[of + 6]), isJudged: words[of + 7] & 2 }));
     const judged = vehicles.filter(({ isJudged }) => isJudged);
     const worst = (better, key) => (judged.length ? better(...judged.map((of) => of[key])) : NaN);
-    return { t: at * setting.dt, v: values[first], vehicles, ttc: worst(Math.min, "ttc"), btn: worst(Math.max, "btn") };
+    return { t: at * setting.dt, v: values[first], isUnsafe: words[first + 2] === 1, vehicles, ttc: worst(Math.min, "ttc"), btn: worst(Math.max, "btn") };
   });
 }
-
 // Of the panels over time, the values of a driver, and of the other vehicles, which are the same for all.
 const PANELS = [
   { title: "Gap (m); dashed: to the vehicle ahead", of: ({ vehicles }) => vehicles.map(({ gap }) => gap), others: () => [] },
@@ -75,17 +71,10 @@ function drawTraces(canvas) {
     const high = finite.reduce((top, value) => Math.max(top, value), 1);
     const [low, top] = [most ? 0 : finite.reduce((least, value) => Math.min(least, value), 0), most ? Math.min(high, most) : high];
     const [atX, atY] = [(t) => box.x + (t / until) * box.w, (value) => box.y + box.h - ((value - low) / (top - low)) * box.h];
-    paint.save();
-    paint.beginPath();
-    paint.rect(box.x, box.y, box.w, box.h);
-    paint.clip();
-    for (const [colour, dash, points] of lines) {
-      line(paint, colour, 1.8, dash, () => points.reduce((isDrawn, [t, value]) => {
-        if (Number.isFinite(value)) { paint[isDrawn ? "lineTo" : "moveTo"](atX(t), atY(value)); }
-        return Number.isFinite(value);
-      }, false));
-    }
-    paint.restore();
+    const stroke = (points) => points.forEach(([t, value], of) => {
+      if (Number.isFinite(value)) { paint[Number.isFinite(points[of - 1]?.[1]) ? "lineTo" : "moveTo"](atX(t), atY(value)); }
+    });
+    clipped(paint, () => paint.rect(box.x, box.y, box.w, box.h), () => lines.forEach(([colour, dash, points]) => line(paint, colour, 1.8, dash, () => stroke(points))));
     frame(paint, box, [0, until], [low, top], atX, atY);
     Object.assign(paint, { textAlign: "left", textBaseline: "bottom" });
     paint.fillText(title + (at + across >= PANELS.length ? ", over time (s)" : ""), box.x, box.y - 5, box.w);

@@ -11,7 +11,6 @@ async function openDevice() {
   device?.addEventListener("uncapturederror", (event) => complain(event.error.message));
   device?.lost.then(({ message }) => { device = null; complain(`The device was lost: ${message}`); });
 }
-
 // A pipeline of a source, compiled once for its constants; `types` are those of its bindings.
 function pipeline(code, entryPoint, types, constants) {
   const key = code.length + entryPoint + JSON.stringify(constants);
@@ -24,7 +23,6 @@ function pipeline(code, entryPoint, types, constants) {
   }
   return pipelines.get(key);
 }
-
 // After the drivers comes the ego that never reacts, which has the source of the first.
 const driverAt = (at) => data.drivers[at] ?? data.drivers[0];
 function lanePipeline(setting, at, part) {
@@ -34,7 +32,6 @@ function lanePipeline(setting, at, part) {
 }
 const generatorPipeline = (setting, entry) =>
   pipeline(data.source.generator, entry, ["uniform", INPUT, INPUT, INPUT, "storage", "storage", "storage"], setting.generator);
-
 // One computation: its buffers go with it.
 class Computation {
   buffers = [];
@@ -83,7 +80,6 @@ class Computation {
     return this.uniform([lanes, headways, 0, 1, 0, 0, firstWord, 0, driver, WORKGROUP, shared.frame_longest_burst >> 1, 0]);
   }
 }
-
 // Verdict bits of every lane for each driver and the ego that never reacts; the lanes of a case are neighbours. `impossible`
 // of a lane: 1 no such traffic, 2 no such case.
 async function computeVerdicts(setting, points, starts) {
@@ -99,7 +95,6 @@ async function computeVerdicts(setting, points, starts) {
   const impossible = (lane) => { const at = 2 * Math.floor(lane / starts.length); return drawn[at] > 64 ? 2 : drawn[at + 1]; };
   return { bitsOf, impossible };
 }
-
 // Lanes of one driver to their ends, with the first steps of the first one.
 async function computeOutcomes(setting, at, points, starts, steps) {
   const compiled = await lanePipeline(setting, at, "trace");
@@ -110,7 +105,6 @@ async function computeOutcomes(setting, at, points, starts, steps) {
   const [traced, outcomes] = await all.read(results);
   return { traced, outcomes };
 }
-
 // The value of a BTN's quotient.
 const btnOf = ({ btn }, numerator, denominator) => btn.scale * (denominator === 0 ? Infinity : (numerator / denominator) ** (btn.isRoot ? 0.5 : 1));
 
@@ -122,7 +116,6 @@ function readOutcome(setting, bytes) {
     impact: values[3], closing: values[4], ttc: values[5], btn: btnOf(setting, values[6], values[7]), gap: values[8],
   };
 }
-
 // The drivers whose lanes have other words than the program computed.
 async function differingDrivers(setting) {
   const { points, starts, hashes } = setting.known;

@@ -2,7 +2,6 @@
 const $ = (id) => document.getElementById(`ex-${id}`);
 const complain = (text) => { $("status").textContent = text; };
 let [shownMap, cursor, hovered, millisecondsPerCell] = [null, null, 0, 0];
-
 const element = (tag, properties = {}, ...children) => {
   const made = Object.assign(document.createElement(tag), properties);
   return made.append(...children), made;
@@ -10,7 +9,6 @@ const element = (tag, properties = {}, ...children) => {
 const coloured = (colour, made) => { made.style.setProperty("--of", colour); return made; };
 const choice = (select, options, chosen) =>
   select.replaceChildren(...options.map(([value, text]) => element("option", { value, textContent: text, selected: String(value) === String(chosen) })));
-
 // Computes what the state says and shows it; what is moved meanwhile is computed next, with fewer cells if that takes long.
 let [isBusy, next] = [false, null];
 async function update(isMoving = false) {
@@ -30,7 +28,7 @@ async function update(isMoving = false) {
       const [milliseconds, cells] = [Math.round(performance.now() - began), shownMap.nx * shownMap.ny];
       if (!isProgram) { millisecondsPerCell = milliseconds / cells; }
       Object.assign(document.body.dataset, { drawn: milliseconds, agreement: agreement(shownMap) });
-      $("time").textContent = isProgram ? "Computed by the program that wrote this page."
+      $("time").textContent = isProgram ? `Computed by the program that wrote this page.${isComputable(data.panels[state.panel]) ? "" : " The page does not make cases of this kind: sliders show plain ones."}`
         : `${cells} cells × ${data.drivers.length} drivers, computed here in ${milliseconds} ms${adapterName ? ` on ${adapterName}` : ""}. ${agreement(shownMap)}`;
     }
     if (state.at && shownMap?.isLive) { await showCase(...state.at); }
@@ -39,21 +37,18 @@ async function update(isMoving = false) {
 }
 
 const shownDrivers = () => [...shownMap.names.keys()].filter((at) => state.drivers.includes(shownMap.names[at]));
-
 function render() {
   if (!shownMap) { return; }
   drawMap($("map"), shownMap, shownDrivers(), cursor);
   $("key").innerHTML = keyOf(shownMap, shownDrivers());
   describeCell();
 }
-
 // Where in a row of cells something holds, in values of the horizontal axis.
 function intervals({ xs, nx }, row, holds) {
   const ends = xs.flatMap((_, i) => (holds(row * nx + i) ? [...(i > 0 && holds(row * nx + i - 1) ? [] : [i]), ...(i + 1 < nx && holds(row * nx + i + 1) ? [] : [i])] : []));
   const run = (at) => [...new Set([ends[at], ends[at + 1]])].map((i) => short(xs[i])).join("–");
   return ends.flatMap((_, at) => (at % 2 ? [] : [run(at)])).join(", ") || "nowhere";
 }
-
 // The cell under the pointer or the keys: outcomes, and where in its row each driver fails; then the device's values.
 async function describeCell() {
   const [out, mine, map] = [$("cell"), ++hovered, shownMap];
@@ -82,8 +77,8 @@ async function showCase(x, y) {
   history.replaceState(null, "", toAddress());
   const [setting, one] = [settingOf(), caseAt(x, y)];
   const run = async (at) => {
-    const outcome = readOutcome(setting, (await computeOutcomes(setting, at, one.points, one.starts, 0)).outcomes);
-    const { traced } = await computeOutcomes(setting, at, one.points, one.starts, outcome.lastStep + 1);
+    const { traced, outcomes } = await computeOutcomes(setting, at, one.points, one.starts, setting.stepCap);
+    const outcome = readOutcome(setting, outcomes);
     return { ...driverAt(at), outcome, steps: readSteps(setting, traced, outcome.lastStep) };
   };
   const traces = await Promise.all([...setting.drivers.keys()].map(run));
@@ -119,10 +114,9 @@ function buildControls() {
   $("sliders").replaceChildren(...sliderParameters().map(slider));
   document.querySelectorAll(".ex-live, #ex-kind, #ex-profile").forEach((part) => { part.disabled = !device; });
 }
-
 function slider(parameter) {
   const { key, from, to, step, label, unit, follows, start } = parameter;
-  const is = { min: from, max: to, disabled: Boolean(follows) && state.values[key] === undefined };
+  const is = { min: from, max: to, disabled: isFollowing(key) };
   const range = element("input", { type: "range", id: `ex-value-${key}`, ...is, step, value: valueOf(key) });
   const number = element("input", { type: "number", ...is, step: "any", value: valueOf(key), ariaLabel: labelOf(parameter) });
   const set = (value, isMoving) => {
@@ -134,28 +128,29 @@ function slider(parameter) {
   Object.assign(range, { oninput: () => set(range.value, true), onchange: () => set(range.value, false) });
   number.onchange = () => set(number.value, false);
   const row = element("div", { className: "ex-value" }, element("label", { htmlFor: range.id, textContent: label }), range, number, element("span", { textContent: unit }));
-  const again = () => { state.panel = null; buildControls(); update(); };
-  if (follows) {
-    const box = element("input", { type: "checkbox", checked: is.disabled });
-    box.onchange = () => { if (box.checked) { delete state.values[key]; } else { state.values[key] = valueOf(key); } again(); };
-    row.append(element("label", {}, box, "as the ego"));
-  }
-  if (start !== null && !isStart(state.x.key) && !isStart(state.y.key)) {
-    const other = kindOf().parameters.find((of) => of.start !== null && of.key !== key);
-    row.append(element("button", { type: "button", textContent: `use ${other.label.toLowerCase()}`, onclick: () => { state.start = other.key; again(); } }));
-  }
+  const toggle = (text, checked, change) => row.append(element("label", {}, element("input", { type: "checkbox", checked, onchange: changed(change, false) }), text));
+  if (follows) { toggle("as the ego", is.disabled, () => { state.values[key] = is.disabled ? valueOf(key) : null; }); }
+  if (start !== null && !isStart(state.x.key) && !isStart(state.y.key)) { toggle("as a time headway", key === "thw_s", () => { state.start = key === "thw_s" ? "gap_m" : "thw_s"; }); }
   return row;
 }
+// A listener that changes the state; another case is shown no more.
+const changed = (change, isOther = true) => () => {
+  state.panel = null;
+  if (isOther) { [state.at, $("case").hidden] = [null, true]; }
+  change();
+  setKind(state.kind);
+  buildControls();
+  update();
+};
 
 function listen() {
-  const again = (change) => () => { [state.panel, state.at, $("case").hidden] = [null, null, true]; change(); setKind(state.kind); buildControls(); update(); };
-  $("kind").onchange = again(() => { state.kind = $("kind").value; });
-  $("profile").onchange = again(() => { state.profile = $("profile").value; });
-  $("panel").onchange = again(() => { if ($("panel").value !== "") { showPanel(Number($("panel").value)); } });
+  $("kind").onchange = changed(() => { state.kind = $("kind").value; });
+  $("profile").onchange = changed(() => { state.profile = $("profile").value; });
+  $("panel").onchange = changed(() => { if ($("panel").value !== "") { showPanel(Number($("panel").value)); } });
   for (const side of ["x", "y"]) {
-    $(side).onchange = again(() => setAxis(side, $(side).value));
+    $(side).onchange = changed(() => setAxis(side, $(side).value));
     const [from, to] = [$(`${side}-from`), $(`${side}-to`)];
-    from.onchange = to.onchange = again(() => { state[side] = axisOf(state[side].key, side, from.valueAsNumber, to.valueAsNumber, state[side].cells); });
+    from.onchange = to.onchange = changed(() => { state[side] = axisOf(state[side].key, side, from.valueAsNumber, to.valueAsNumber, state[side].cells); });
   }
   const canvas = $("map");
   const move = (to) => { if (to && to.cell !== cursor?.cell) { cursor = to; render(); } };
@@ -177,7 +172,6 @@ function listen() {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
   addEventListener("hashchange", () => { if (fromAddress()) { buildControls(); update(); } });
 }
-
 async function start() {
   try { await openDevice(); } catch (error) { device = null; }
   if (!fromAddress()) {

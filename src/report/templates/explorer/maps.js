@@ -3,22 +3,19 @@
 const OUTCOME = Object.fromEntries(data.outcomes.map(({ key }, at) => [key, at]));
 const criterionBit = () => data.criteria.find(({ key }) => key === state.criterion).bit;
 const failsAt = (map, at, cell) => (map.bits(at, cell) >> criterionBit()) & 1;
-
 // The kind with the parameters of the program's map; undefined if there is none.
 function kindOfGrid({ x, y, panelAxes, fixed, category }) {
   const flags = [x, y, ...panelAxes, ...fixed.map(([axis]) => axis)].map(({ flag }) => flag);
   const isKnown = (kind, flag) => kind.parameters.some((of) => of.flag === flag) || data.sizes.some((size) => size.startsWith(`--${flag} `));
   return data.kinds.find((kind) => kind.category === category.replace("_", "-") && flags.every((flag) => isKnown(kind, flag)));
 }
-
 // Whether the device computes the same cases.
 const isComputable = ({ grid }) => grid.isPlain && data.settings.some(({ profile, kind }) => profile === data.profiles[0] && kind === kindOfGrid(grid)?.key);
-
 // The state of a panel of the program's maps, as far as the page has its parameters.
 function showPanel(at) {
   const { grid, values } = data.panels[at];
   const [given, kind] = [[...grid.fixed, ...grid.panelAxes.map((axis, place) => [axis, values[place]])], kindOfGrid(grid)];
-  [state.panel, state.profile, state.values] = [at, data.profiles[0], {}];
+  [state.panel, state.profile, state.values] = [at, data.profiles[0], { other_speed_kmh: null }];
   if (!kind) { return; }
   state.kind = kind.key;
   const known = ({ flag }) => kind.parameters.find((of) => of.flag === flag);
@@ -32,20 +29,21 @@ function showPanel(at) {
     if (known(of).start !== null) { state.start = known(of).key; }
   }
 }
-
 // Run lengths: a count, if it is not 1, and a letter.
 const unpacked = (text) => [...text.matchAll(/(\d*)([a-z])/g)].flatMap(([, count, letter]) => Array(Number(count || 1)).fill(letter.charCodeAt(0) - 97));
 
 function programMap(at) {
   const { grid, panel } = data.panels[at];
-  grid.cells ??= Object.fromEntries(Object.entries(grid.outcomes).map(([criterion, drivers]) => [criterion, drivers.map(unpacked)]));
+  grid.runs ??= Object.fromEntries(Object.entries(grid.outcomes).map(([criterion, drivers]) => [criterion, drivers.map(unpacked)]));
   const [nx, ny] = [grid.x.values.length, grid.y.values.length];
-  const outcome = (driver, cell, criterion = state.criterion) => grid.cells[criterion][driver][panel * nx * ny + cell];
+  const outcome = (driver, cell, criterion = state.criterion) => grid.runs[criterion][driver][panel * nx * ny + cell];
   const fails = (of) => of === OUTCOME.Fail || of === OUTCOME.FailByReaction;
   const bits = (driver, cell) => data.criteria.reduce((sum, { key, bit }) => sum | (fails(outcome(driver, cell, key)) << bit), 0);
-  return { nx, ny, x: grid.x, y: grid.y, xs: grid.x.values, ys: grid.y.values, names: grid.models, bits, outcome, isPossible: (cell) => outcome(0, cell) !== OUTCOME.NoTraffic };
+  const references = data.settings.find(({ profile }) => profile === data.profiles[0])?.references ?? [];
+  const notPreventable = (cell) => references.every((name) => outcome(grid.models.indexOf(name), cell, "collision") === OUTCOME.Fail);
+  return { nx, ny, x: grid.x, y: grid.y, xs: grid.x.values, ys: grid.y.values, names: grid.models, bits, outcome, isPossible: (cell) => outcome(0, cell) !== OUTCOME.NoTraffic,
+    references, notPreventable: references.length && references.every((name) => grid.models.includes(name)) ? notPreventable : null };
 }
-
 // `coarse`: fewer cells. If the initial distance is on an axis, its values are the starts of the other axis' cases.
 async function deviceMap(coarse) {
   const setting = settingOf();
@@ -67,13 +65,11 @@ async function deviceMap(coarse) {
     if (!isCollision || unreacting(cell) & 1) { return fails ? OUTCOME.Fail : OUTCOME.Pass; }
     return fails ? OUTCOME.FailByReaction : OUTCOME.NoConflict;
   };
-  const at = setting.references.map((name) => names.indexOf(name));
-  const allCollide = (cell) => isPossible(cell) && (unreacting(cell) & 1) === 1 && at.every((driver) => bits(driver, cell) & 1);
-  const notPreventable = at.length ? allCollide : null;
+  const { references } = setting;
+  const allCollide = (cell) => isPossible(cell) && (unreacting(cell) & 1) === 1 && references.every((name) => bits(names.indexOf(name), cell) & 1);
   const isCase = (cell) => impossible(laneOf(cell)) !== 2;
-  return { nx, ny, x: parameterOf(x.key), y: parameterOf(y.key), xs, ys, names, bits, outcome, isPossible, isCase, notPreventable, references: setting.references, isLive: true };
+  return { nx, ny, x: parameterOf(x.key), y: parameterOf(y.key), xs, ys, names, bits, outcome, isPossible, isCase, references, notPreventable: references.length ? allCollide : null, isLive: true };
 }
-
 // What a map of the device and the program's map of the same cells have in common.
 function agreement(map) {
   const ours = state.panel === null || state.profile !== data.profiles[0] ? null : programMap(state.panel);

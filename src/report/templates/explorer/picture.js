@@ -2,7 +2,6 @@
 const shade = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const labelOf = ({ label, unit }) => `${label} (${unit})`;
 const short = (value) => String(Number(value.toPrecision(4)));
-
 // The brush of a canvas with these CSS pixels, sharp on every screen.
 function brush(canvas, height) {
   const [width, ratio, paint] = [canvas.parentElement.clientWidth, window.devicePixelRatio || 1, canvas.getContext("2d")];
@@ -12,7 +11,6 @@ function brush(canvas, height) {
   paint.font = "12px 'DejaVu Sans', Verdana, Arial, sans-serif";
   return { paint, width };
 }
-
 // Round numbers in a range.
 function ticks(from, to, most) {
   const rough = (to - from) / most || 1;
@@ -23,14 +21,22 @@ function ticks(from, to, most) {
 }
 
 function line(paint, colour, wide, dash, draw) {
-  Object.assign(paint, { strokeStyle: colour, lineWidth: wide, lineCap: "butt" });
-  paint.setLineDash(dash);
+  paint.save();
+  Object.assign(paint, { strokeStyle: colour, lineWidth: wide }).setLineDash(dash);
   paint.beginPath();
   draw();
   paint.stroke();
-  paint.setLineDash([]);
+  paint.restore();
 }
-
+// Draws within a path only.
+function clipped(paint, path, draw) {
+  paint.save();
+  paint.beginPath();
+  path();
+  paint.clip();
+  draw();
+  paint.restore();
+}
 // A frame with ticks; `atX` and `atY` place values.
 function frame(paint, box, xs, ys, atX, atY) {
   Object.assign(paint, { fillStyle: shade("--ink"), textAlign: "center", textBaseline: "top" });
@@ -45,34 +51,29 @@ function frame(paint, box, xs, ys, atX, atY) {
     paint.fillText(short(value), box.x - 7, atY(value));
   }
 }
-
 // Where a value stands on an axis of cells, in cells.
 function placeOf(values, value) {
   const above = values.findIndex((known) => known >= value);
   if (above <= 0) { return above === 0 ? 0.5 : values.length - 0.5; }
   return above - 0.5 + (value - values[above]) / (values[above] - values[above - 1]);
 }
-
 // With one driver a cell shows its outcome, with several how many of them fail.
 function drawMap(canvas, map, shown, cursor) {
   const height = Math.min(canvas.parentElement.clientWidth * 0.72, 560);
   const { paint, width } = brush(canvas, height);
   const box = { x: 56, y: 10, w: width - 66, h: height - 60 };
   const [cw, ch] = [box.w / map.nx, box.h / map.ny];
-  const [px, py, cellOf] = [(i) => box.x + i * cw, (j) => box.y + box.h - j * ch, (i, j) => j * map.nx + i];
+  const [px, py] = [(i) => Math.round(box.x + i * cw), (j) => Math.round(box.y + box.h - j * ch)];
+  const cellRectangle = ({ i, j }) => [px(i), py(j + 1), px(i + 1) - px(i), py(j) - py(j + 1)];
   const places = [...Array(map.nx * map.ny).keys()].map((cell) => ({ cell, i: cell % map.nx, j: Math.floor(cell / map.nx) }));
-  for (const { cell, i, j } of places) {
-    paint.fillStyle = colourOf(map, shown, cell);
-    paint.fillRect(px(i), py(j + 1), cw + 0.5, ch + 0.5);
+  for (const place of places) {
+    paint.fillStyle = colourOf(map, shown, place.cell);
+    paint.fillRect(...cellRectangle(place));
   }
-  paint.save();
-  paint.beginPath();
-  places.filter(({ cell }) => !map.isPossible(cell)).forEach(({ i, j }) => paint.rect(px(i), py(j + 1), cw + 0.5, ch + 0.5));
-  paint.clip();
-  line(paint, "#ffffff", 1.2, [], () => {
+  const impossible = () => places.filter(({ cell }) => !map.isPossible(cell)).forEach((place) => paint.rect(...cellRectangle(place)));
+  clipped(paint, impossible, () => line(paint, "#ffffff", 1.2, [], () => {
     for (let x = box.x - height; x < width; x += 7) { paint.moveTo(x, height); paint.lineTo(x + height, 0); }
-  });
-  paint.restore();
+  }));
   const around = (holds, colour, dash, wide) => {
     const inside = places.map(({ cell }) => holds(cell));
     const edges = () => places.forEach(({ cell, i, j }) => {
@@ -84,7 +85,7 @@ function drawMap(canvas, map, shown, cursor) {
   };
   shown.forEach((at) => around((cell) => Boolean(map.isPossible(cell) && failsAt(map, at, cell)), colourOfDriver(map, at), [], 1.6));
   if (surrounds(map)) { around((cell) => Boolean(map.notPreventable(cell)), data.boundary, [5, 3], 1.8); }
-  if (cursor) { line(paint, shade("--ink"), 2, [], () => paint.rect(px(cursor.i), py(cursor.j + 1), cw, ch)); }
+  for (const [colour, wide] of cursor ? [["#ffffff", 5], ["#1a1a1a", 2]] : []) { line(paint, colour, wide, [], () => paint.rect(...cellRectangle(cursor))); }
   frame(paint, box, map.xs, map.ys, (value) => px(placeOf(map.xs, value)), (value) => py(placeOf(map.ys, value)));
   Object.assign(paint, { textAlign: "center", textBaseline: "alphabetic" });
   paint.fillText(labelOf(map.x), box.x + box.w / 2, height - 12, box.w);
@@ -93,7 +94,7 @@ function drawMap(canvas, map, shown, cursor) {
   canvas.shown = { map, cursor };
   canvas.cellAt = (x, y) => {
     const [i, j] = [Math.floor((x - box.x) / cw), Math.floor((box.y + box.h - y) / ch)];
-    return i >= 0 && j >= 0 && i < map.nx && j < map.ny ? { i, j, cell: cellOf(i, j) } : null;
+    return i >= 0 && j >= 0 && i < map.nx && j < map.ny ? { i, j, cell: j * map.nx + i } : null;
   };
 }
 
@@ -103,32 +104,27 @@ const colourOfDriver = (map, at) => data.drivers.find(({ name }) => name === map
 function colourOf(map, shown, cell) {
   const outcomes = shown.map((at) => map.outcome(at, cell));
   const failing = shown.filter((at) => failsAt(map, at, cell)).length;
-  if (!map.isPossible(cell)) { return data.outcomes[OUTCOME.NoTraffic].colour; }
+  if (!map.isPossible(cell) || !shown.length) { return data.outcomes[OUTCOME.NoTraffic].colour; }
   if (shown.length > 1 && failing > 0) { return mixed(failing / shown.length); }
   // Of several that pass, one has a conflict to avoid.
   return data.outcomes[shown.length === 1 ? outcomes[0] : outcomes.find((of) => of !== OUTCOME.NoConflict) ?? OUTCOME.NoConflict].colour;
 }
-
 // From pale to the colour of a failure.
 function mixed(share) {
   const [from, to] = ["#d5deec", data.outcomes[OUTCOME.Fail].colour].map((colour) => [1, 3, 5].map((at) => Number.parseInt(colour.slice(at, at + 2), 16)));
   return `rgb(${from.map((value, at) => Math.round(value + (to[at] - value) * share))})`;
 }
-
 // What the colours and lines mean, with counts.
 function keyOf(map, shown) {
   const cells = [...Array(map.nx * map.ny).keys()];
   const possible = cells.filter(map.isPossible);
   const entry = (kind) => (colour, text) => `<li><span class="${kind}" style="--of: ${colour}"></span>${text}</li>`;
   const [fill, rule] = [entry("fill"), entry("line")];
-  const colours = new Map(cells.map((cell) => [colourOf(map, shown, cell), cell]));
-  const words = ([colour, cell]) => {
-    const failing = shown.filter((at) => failsAt(map, at, cell)).length;
-    const isMixed = shown.length > 1 && failing > 0 && map.isPossible(cell);
-    return fill(colour, isMixed ? `${failing} of ${shown.length} fail` : data.outcomes.find((of) => of.colour === colour).label);
-  };
+  const failing = (cell) => (shown.length > 1 && map.isPossible(cell) ? shown.filter((at) => failsAt(map, at, cell)).length : 0);
+  const colours = new Map(cells.map((cell) => [colourOf(map, shown, cell), failing(cell)]));
+  const words = ([colour, count]) => fill(colour, count ? `${count} of ${shown.length} fail` : data.outcomes.find((of) => of.colour === colour).label);
   const share = (at) => (100 * possible.filter((cell) => failsAt(map, at, cell)).length) / (possible.length || 1);
   const drivers = shown.map((at) => rule(colourOfDriver(map, at), `${map.names[at]} fails in ${share(at).toFixed(1)} %`));
-  const both = surrounds(map) ? [rule(data.boundary, `around what is not preventable, ${map.references.join(" and ")} both collide: ${possible.filter(map.notPreventable).length}`)] : [];
-  return `<ul>${[...[...colours].sort().map(words), ...drivers, ...both].join("")}</ul>`;
+  const both = surrounds(map) && possible.some(map.notPreventable) ? [rule(data.boundary, `around what is not preventable, ${map.references.join(" and ")} both collide: ${possible.filter(map.notPreventable).length}`)] : [];
+  return `<ul>${[...[...colours].sort(([, a], [, b]) => a - b).map(words), ...drivers, ...both].join("")}</ul>`;
 }

@@ -18,8 +18,10 @@ const isStart = (key) => parameterOf(key).start !== null;
 const decimal = (value) => Math.round(value * 1e9) / 1e9;
 const within = (value, low, high) => Math.min(Math.max(value, low), high);
 
-const valueOf = (key) => state.values[key] ?? (parameterOf(key).follows ? valueOf(parameterOf(key).follows) : parameterOf(key).value);
-
+// A vehicle is as fast as the ego if its speed is null; without one, but for cut-ins, which need another.
+const isFollowing = (key) => Boolean(parameterOf(key).follows) && (state.values[key] === null || (state.values[key] === undefined && kindOf().category !== "cut-in"));
+// The value of a parameter where the axes have the values `at`.
+const valueOf = (key, at = {}) => at[key] ?? (isFollowing(key) ? valueOf(parameterOf(key).follows, at) : state.values[key] ?? parameterOf(key).value);
 // An axis within the range of its parameter.
 function axisOf(key, side, from = -Infinity, to = Infinity, cells = side === "x" ? 60 : 40) {
   const { from: low, to: high } = parameterOf(key);
@@ -28,7 +30,6 @@ function axisOf(key, side, from = -Infinity, to = Infinity, cells = side === "x"
 }
 
 const axisValues = ({ from, to, cells }) => Array.from({ length: cells }, (_, at) => decimal(from + ((to - from) * at) / (cells - 1)));
-
 // Completes the state after a change of the kind.
 function setKind(key) {
   state.kind = key;
@@ -38,7 +39,6 @@ function setKind(key) {
   if (!isKnown(state.y) || !isFree(state.y.key)) { state.y = axisOf(["lateral_speed_mps", "deceleration_mps2", "ego_speed_kmh"].find(isFree), "y"); }
   if (!settingOf()) { state.profile = data.settings.find(({ kind }) => kind === key).profile; }
 }
-
 // Two axes of one parameter, or both initial distances at once, are no case.
 function setAxis(side, key) {
   const other = side === "x" ? "y" : "x";
@@ -47,7 +47,6 @@ function setAxis(side, key) {
 }
 
 const startKey = () => [state.x.key, state.y.key].find(isStart) ?? state.start;
-
 // The parameters that have a slider: neither an axis nor the other initial distance.
 const sliderParameters = () =>
   kindOf().parameters.filter(({ key, start }) => key !== state.x.key && key !== state.y.key && (start === null || key === startKey()));
@@ -58,7 +57,6 @@ function toAddress() {
   const fields = { kind, profile, criterion, drivers, start, x: axis(x), y: axis(y), ...values, ...(panel === null ? {} : { panel }), ...(at ? { at } : {}) };
   return "#" + new URLSearchParams(fields);
 }
-
 // Reads the address; false if it has no state. What the page does not have is left out.
 function fromAddress() {
   const fields = Object.fromEntries(new URLSearchParams(location.hash.slice(1)));
@@ -74,7 +72,8 @@ function fromAddress() {
     state[side] = parameterOf(key) && rest.length === 3 && rest.every((number) => Number.isFinite(Number(number))) ? axisOf(key, side, ...rest.map(Number)) : null;
   }
   const given = kindOf().parameters.filter(({ key }) => Number.isFinite(numbers(fields[key])[0]));
-  state.values = Object.fromEntries(given.map(({ key, from, to }) => [key, within(Number(fields[key]), from, to)]));
+  const following = kindOf().parameters.filter(({ key }) => fields[key] === "null").map(({ key }) => [key, null]);
+  state.values = Object.fromEntries([...following, ...given.map(({ key, from, to }) => [key, within(Number(fields[key]), from, to)])]);
   state.panel = data.panels[fields.panel] ? Number(fields.panel) : null;
   const at = numbers(fields.at, ",");
   state.at = at.length === 2 && at.every(Number.isFinite) ? at : null;
