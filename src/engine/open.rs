@@ -157,7 +157,7 @@ fn nothing_to_verify() -> Error {
 
 /// The error of a program without GPU support if a GPU is required.
 #[cfg(not(feature = "gpu"))]
-pub(crate) fn no_gpu(requested: &str) -> Error {
+pub fn no_gpu(requested: &str) -> Error {
     let help = format!("use {}, or build it with the feature `gpu`", option("backend = cpu"));
     Error::device(requested, "this program was built without the feature `gpu`", help)
 }

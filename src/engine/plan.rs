@@ -468,7 +468,7 @@ impl Units {
     }
 
     /// Units whose cases are available: all, unless a study is read or made in part.
-    pub(crate) fn held(&self) -> Range<u64> {
+    pub fn held(&self) -> Range<u64> {
         match self {
             Units::Held(_, first, names) => *first..first + names.len() as u64,
             Units::Numbered(count) => 0..*count,

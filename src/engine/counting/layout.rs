@@ -65,12 +65,12 @@ impl CountLayout {
     }
 
     /// Number of counts that every sample may change; the others belong to a group.
-    pub(crate) fn of_every_sample(&self) -> usize {
+    pub fn of_every_sample(&self) -> usize {
         self.capped().end
     }
 
     /// Number of counts.
-    pub(crate) fn total(&self) -> usize {
+    pub fn total(&self) -> usize {
         self.kernel_failures().end
     }
 

@@ -131,7 +131,7 @@ impl Generator {
     }
 
     /// Entries of one case in a device's table of instants: the last instant of a series is there twice.
-    pub(crate) fn case_instants(&self) -> u32 {
+    pub fn case_instants(&self) -> u32 {
         let columns = &self.recipe.columns;
         let others = [columns.lateral, columns.lead_speed].into_iter().filter(|first| *first != NO_SLOT);
         let series = 1 + others.count() as u32;

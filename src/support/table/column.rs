@@ -29,7 +29,7 @@ pub enum ColumnKind {
 
 impl ColumnKind {
     /// The type as the chapter on tables names it.
-    pub(crate) fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             ColumnKind::Text => "string",
             ColumnKind::Name => "dictionary",
