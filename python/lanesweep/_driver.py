@@ -162,9 +162,8 @@ def decided(driver: Driver, state: Any, step: int, time_s: float, lane: npt.NDAr
     count = len(lane)
     found = np.asarray(driver.acceleration(View(step, time_s, lane, rows.reshape(16, -1)[:, :count]), state), dtype=np.float32)
     if found.ndim > 1:
-        raise _core.UsageError(
-            f"`acceleration` returned an array of {found.ndim} dimensions and the shape {found.shape}; expected one number per lane: ({count},)"
-        )
+        shape = f"{found.ndim} dimensions and the shape {found.shape}"
+        raise _core.UsageError(f"`acceleration` returned an array of {shape}; expected one number per lane: ({count},)")
     if found.ndim == 1 and len(found) != count:
         raise _core.UsageError(f"`acceleration` returned {len(found)} numbers for {count} lanes")
     return np.ascontiguousarray(np.broadcast_to(found, count))
@@ -175,10 +174,8 @@ _compiled: dict[str, Any] = {}
 
 
 def _machine_code(driver: Driver) -> Any:
-    """What `compiled` is: a function of Python, numba or ctypes, or an address."""
-    found = driver.compiled
-    # A method is the function in the class.
-    return getattr(found, "__func__", found)
+    """What `compiled` is: a function of Python (in the class, not bound), numba or ctypes, or an address."""
+    return getattr(driver.compiled, "__func__", driver.compiled)
 
 
 def _address(driver: Driver) -> int:

@@ -132,7 +132,6 @@ class _Walk:
             self.say(value.name)
             self.add(type(value), where)
         elif isinstance(value, CFuncPtr):
-            # A function of a library, or one of Python for C.
             self.say("function of C", getattr(value, "__name__", None))
             self.add(list((value._objects or {}).values()), where)
         elif isinstance(value, ctypes.CDLL):

@@ -105,11 +105,7 @@ def _bars(rows: list[dict[str, Any]], axis: str, at: list[float]) -> Any:
 class _Kept(type(Path())):  # type: ignore[misc]
     """A path whose temporary folder stays with it."""
 
-    @classmethod
-    def of(cls, path: Path, keep: Any) -> Path:
-        made = cls(path)
-        made.keep = keep
-        return made
+    keep: Any = None
 
 
 class Result:
@@ -162,7 +158,10 @@ class Result:
         if self.verb != "fit" or self.path is None:
             return {}
         found = self._files("*.json") if self.path.is_dir() else iter([self.path])
-        return {path.stem: _Kept.of(path, self._keep) for path in sorted(found) if not path.name.startswith("lanesweep-")}
+        kept = [_Kept(path) for path in sorted(found) if not path.name.startswith("lanesweep-")]
+        for path in kept:
+            path.keep = self._keep
+        return {path.stem: path for path in kept}
 
     @property
     def tables(self) -> list[str]:

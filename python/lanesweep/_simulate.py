@@ -214,8 +214,7 @@ class LimitState(_core.LimitState):
 
     _arguments: dict[str, Any]
     _known_as: str
-    #: A copy reads the file again, which goes with what gave it.
-    _keep: Any
+    _keep: Any  # a copy reads the file again
 
     def __reduce__(self) -> tuple[Any, ...]:
         return functools.partial(LimitState, **self._arguments), ()
