@@ -30,7 +30,7 @@ impl Study {
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Input`] with the missing, duplicate, foreign or damaged parts.
-    pub(crate) fn merge_parts(out: &Path, again: &dyn Fn(Shard) -> String) -> Result<(Study, StudyResult)> {
+    pub fn merge_parts(out: &Path, again: &dyn Fn(Shard) -> String) -> Result<(Study, StudyResult)> {
         // Merging needs only counts and no scenarios.
         let study = Study::read_units(&out.join(PLAN_FILE), |_| 0..0)?;
         let result = study.merge(out, again)?;

@@ -121,7 +121,7 @@ impl Mixture {
     ///
     /// # Panics
     /// If a point has another length than the mixture has parameters.
-    pub(crate) fn log_densities(&self, points: &[&[f64]]) -> Vec<f64> {
+    pub fn log_densities(&self, points: &[&[f64]]) -> Vec<f64> {
         self.each(points, |of, lane| of.log_density(lane))
     }
 
