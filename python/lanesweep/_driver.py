@@ -169,7 +169,6 @@ def decided(driver: Driver, state: Any, step: int, time_s: float, lane: npt.NDAr
     return np.ascontiguousarray(np.broadcast_to(found, count))
 
 
-#: Functions that numba compiled, by their digest.
 _compiled: dict[str, Any] = {}
 
 

@@ -136,7 +136,6 @@ impl Frame {
                 let objects = rows.map(|(array, row)| Ok(value(py, array, row)?.unbind()));
                 PyArray1::from_vec(py, objects.collect::<PyResult<Vec<Py<PyAny>>>>()?).into_any()
             }
-            // Of another library: a time stamp.
             _ => py.import("pyarrow")?.call_method1("table", (slf,))?.get_item(name)?.call_method0("to_numpy")?,
         })
     }

@@ -80,7 +80,6 @@ pub fn watched<T: Send + 'static>(
             Err(_) => Err(RecvTimeoutError::Disconnected),
         });
         if let Err(error) = pass_on(py, on_progress, on_message) {
-            embedded::cancel();
             if ended.is_some() && result.is_err() && error.is_instance_of::<PyKeyboardInterrupt>(py) {
                 // The work does not look for the request: it goes on alone, and the next call is refused until it ends.
                 IS_LEFT_ALONE.store(true, Ordering::Release);
