@@ -98,7 +98,7 @@ impl Canonical {
     }
 
     /// A case, field by field.
-    pub fn case(&mut self, case: &LaneCase<f64>) {
+    pub(crate) fn case(&mut self, case: &LaneCase<f64>) {
         let LaneCase { others, ego_speed, ego_width, lane_width, horizon, pair } = case;
         let mut bytes = Vec::with_capacity(320);
         for other in others {

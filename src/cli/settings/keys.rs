@@ -70,7 +70,7 @@ impl Key {
     }
 
     /// A key by its name.
-    pub fn find<'a>(keys: &'a [Key], name: &str) -> Option<&'a Key> {
+    pub(crate) fn find<'a>(keys: &'a [Key], name: &str) -> Option<&'a Key> {
         keys.iter().find(|key| key.name == name)
     }
 

@@ -73,7 +73,7 @@ pub(crate) enum Assignment {
 
 impl Assignment {
     /// A text with `=` that is not the name of a file is an assignment.
-    pub fn of(text: &str) -> Assignment {
+    pub(crate) fn of(text: &str) -> Assignment {
         match text.contains('=') && !Path::new(text).exists() {
             true => Assignment::Value(text.to_owned()),
             false => Assignment::File(PathBuf::from(text)),
@@ -119,7 +119,7 @@ impl Layers {
     /// # Errors
     /// [`Error::Usage`] naming file and line, or flag: unknown keys, with the most similar known one, and invalid values.
     /// [`Error::Io`] and [`Error::Input`] of the files.
-    pub fn read(typed: &[Assignment], variable: Option<&OsStr>) -> Result<Layers> {
+    pub(crate) fn read(typed: &[Assignment], variable: Option<&OsStr>) -> Result<Layers> {
         let mut layers = Layers::defaults();
         let named = typed.iter().filter_map(|one| match one {
             Assignment::File(path) => Some(path.clone()),
@@ -191,7 +191,7 @@ impl Layers {
     }
 
     /// The values that were set, including those equal to the default.
-    pub fn given(&self) -> impl Iterator<Item = Setting<'_>> {
+    pub(crate) fn given(&self) -> impl Iterator<Item = Setting<'_>> {
         self.list().filter(|setting| *setting.origin != Origin::Default)
     }
 

@@ -14,7 +14,7 @@ use lanesweep_model::driver::{DriverModel, DriverState};
 use lanesweep_model::scalar::Flag;
 
 /// Marks a lane that never leaves its batch.
-pub const NEVER_LEAVES: u32 = Flag::LATEST_STEP;
+pub(crate) const NEVER_LEAVES: u32 = Flag::LATEST_STEP;
 
 /// Slots of a batch: one bit each.
 pub(crate) type Slots = u16;

@@ -57,7 +57,7 @@ pub(crate) struct Setting<'d, R> {
 
 impl<'d, R: Real> Setting<'d, R> {
     /// A driver with the frame and the criteria of its category, and the time step.
-    pub fn new(
+    pub(crate) fn new(
         (model, driver): (ModelId, &'d dyn VectorDriver),
         mut frame: Frame<R>,
         criteria: Criteria<R>,

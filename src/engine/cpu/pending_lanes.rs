@@ -187,7 +187,7 @@ impl Pending {
 
 /// Gives the slots, in their order, the entries of every row from a place on: one by one, on every machine.
 #[inline(always)]
-pub fn take(rows: &mut [Words], pending: &[[u32; ROOM]], from: usize, slots: Slots) {
+pub(crate) fn take(rows: &mut [Words], pending: &[[u32; ROOM]], from: usize, slots: Slots) {
     for (row, pending) in rows.iter_mut().zip(pending) {
         let (mut left, mut from) = (slots, from);
         while left != 0 {

@@ -76,7 +76,7 @@ impl<'p, R: Real> LaneRunner<'p, R> {
 
     /// Batches make every step with all vehicles. By default verdict-only batches skip steps that change no verdict.
     /// The verdicts are equal.
-    pub fn every_step(mut self, every_step: bool) -> Self {
+    pub(crate) fn every_step(mut self, every_step: bool) -> Self {
         self.every_step = every_step;
         self
     }

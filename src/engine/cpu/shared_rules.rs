@@ -38,7 +38,7 @@ const fn seldom(scene: Scene, is_ratio: bool, keeps_measures: bool) -> Rules {
 impl Rules {
     /// Every set. Lateral motion in the lane is not evaluated, so there is no gate.
     #[rustfmt::skip] // a table
-    pub const ALL: [Rules; 22] = [
+    pub(crate) const ALL: [Rules; 22] = [
         usual(ALONE, false, false), usual(PAIR, false, false), usual(ALONE, true, false), usual(PAIR, true, false),
         usual(ALONE, false, true), usual(PAIR, false, true), usual(ALONE, true, true), usual(PAIR, true, true),
         usual(CROSSING, false, false), usual(CROSSING, true, false), usual(CROSSING, false, true), usual(CROSSING, true, true),

@@ -212,7 +212,7 @@ pub(crate) fn logarithmic_reach(intervals: &[(f64, f64, f64)]) -> Vec<f64> {
 }
 
 /// A number with three digits in short form: `0.012`, `250`, `1.5e-6`; NaN and infinity in words.
-pub fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     digits_text(value, 3)
 }
 

@@ -52,7 +52,7 @@ impl Look {
     /// Colour, dash and marker cycle together; from the eighth series on dash and marker are shifted, so that no pair repeats
     /// before 49 series. Lines go from thick to thin and markers from large to small, so that earlier ones stay
     /// visible.
-    pub fn of(index: usize, count: usize) -> Self {
+    pub(crate) fn of(index: usize, count: usize) -> Self {
         let depth = if count > 1 { index as f64 / (count - 1) as f64 } else { 0.5 };
         Self {
             colour: COLOURS[index % COLOURS.len()],

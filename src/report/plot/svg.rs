@@ -195,7 +195,7 @@ impl Canvas {
     }
 
     /// Draws one line of text on its base line.
-    pub fn text(&mut self, (x, y): Position, line: &str, set: Type, anchor: Anchor) {
+    pub(crate) fn text(&mut self, (x, y): Position, line: &str, set: Type, anchor: Anchor) {
         let mut text = format!("<text x=\"{}\" y=\"{}\" font-size=\"{}\"", Number(x), Number(y), set.size_px);
         let anchor = match anchor {
             Anchor::Start => None,

@@ -42,7 +42,7 @@ impl Shard {
     const MAX_SHARDS: u64 = 100_000;
 
     /// The units of this shard, out of `count`.
-    pub fn units(&self, count: u64) -> Range<u64> {
+    pub(crate) fn units(&self, count: u64) -> Range<u64> {
         // 128 bits, because index × count may exceed 64 bits.
         let cut = |index: u64| (u128::from(count) * u128::from(index) / u128::from(self.of)) as u64;
         cut(self.index)..cut(self.index + 1)

@@ -112,7 +112,7 @@ impl Reopened {
     }
 
     /// The plan; for a study it has no cases.
-    pub fn plan(&self) -> &LanePlan {
+    pub(crate) fn plan(&self) -> &LanePlan {
         match &self.lanes {
             Lanes::Study(study) => study.plan(),
             Lanes::Sample(plan, _) | Lanes::Scenarios(plan) => plan,
@@ -176,7 +176,7 @@ impl Reopened {
     ///
     /// # Errors
     /// [`Error::Usage`] for a lane that does not exist, and for a void sample, which has no case.
-    pub fn find(&self, text: &str) -> Result<LaneKey> {
+    pub(crate) fn find(&self, text: &str) -> Result<LaneKey> {
         let plan = self.plan();
         // Rows of a density that draws the headway have this word in place of it.
         let written = if self.density().is_some() { text.replace("/sampled/", "/0m/") } else { text.to_owned() };

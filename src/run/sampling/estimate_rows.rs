@@ -268,7 +268,7 @@ impl RiskRate {
 
 impl Risk {
     /// Risk of an estimate under an exposure.
-    pub fn of(estimate: &Estimate, exposure: Option<&Exposure>) -> Risk {
+    pub(crate) fn of(estimate: &Estimate, exposure: Option<&Exposure>) -> Risk {
         let product = |rate: Option<&Rate>, scale: f64| rate.map(|rate| RiskRate::of(rate, scale, estimate));
         Risk {
             per_hour: product(exposure.and_then(|e| e.per_hour.as_ref()), 1.0),

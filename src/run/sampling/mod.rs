@@ -168,7 +168,7 @@ impl Sample {
     }
 
     /// Number of samples; before a search, and with a stop rule, the maximum.
-    pub fn samples(&self) -> u64 {
+    pub(crate) fn samples(&self) -> u64 {
         match &self.kind {
             SampleKind::Weighted(weighted) => weighted.draws.draws,
             _ => self.options.stop.samples,

@@ -26,7 +26,7 @@ pub struct ScenarioRate {
 
 impl ScenarioRate {
     /// Hits over runs; both have one entry per scenario, in the same order for all rates of a contrast.
-    pub fn new(runs: Vec<u64>, hits: Vec<u64>) -> ScenarioRate {
+    pub(crate) fn new(runs: Vec<u64>, hits: Vec<u64>) -> ScenarioRate {
         ScenarioRate { runs, hits, is_f1: false }
     }
 

@@ -23,7 +23,7 @@ impl HeadwayFailures {
     ///
     /// # Errors
     /// [`Error::Internal`] if the counts do not match the plan.
-    pub fn of(plan: &LanePlan, partial: &Partial, block: usize) -> Result<HeadwayFailures> {
+    pub(crate) fn of(plan: &LanePlan, partial: &Partial, block: usize) -> Result<HeadwayFailures> {
         let failures = partial.headway_failures(plan, block)?.to_vec();
         HeadwayFailures::new(&plan.blocks[block].variants, &plan.headways, &plan.models, failures)
     }

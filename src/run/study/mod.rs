@@ -203,7 +203,7 @@ impl Study {
     }
 
     /// The first line of the plan file, and the hash of the run. The line contains the checksums of the rest.
-    pub fn seal(&self) -> Result<(Vec<u8>, String)> {
+    pub(crate) fn seal(&self) -> Result<(Vec<u8>, String)> {
         seal(Study::KIND, &StudyPlanFile { facts: self.facts.clone(), plan: self.cases.head().clone() })
     }
 

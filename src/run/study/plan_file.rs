@@ -83,7 +83,7 @@ pub struct StudyHead {
 /// One category's part of a study.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct BlockHead {
+pub(crate) struct BlockHead {
     pub(super) category: Category,
     pub(super) units: u64,
     /// `None` if there were too few scenarios for a decomposition.
@@ -98,7 +98,7 @@ pub struct BlockHead {
 
 impl BlockHead {
     /// Keeps the part of the decompositions that cases are made with.
-    pub fn new(
+    pub(crate) fn new(
         category: Category,
         units: u64,
         reduction: Option<&Reduction>,
@@ -144,7 +144,7 @@ pub fn plan_of_parts(
 
 impl StudyHead {
     /// The head for scenarios that are all held.
-    pub fn new(
+    pub(crate) fn new(
         profile: Profile,
         models: Vec<ModelId>,
         headways: Vec<Headway>,

@@ -50,7 +50,7 @@ impl ReferenceComparison {
     }
 
     /// Adds two chunks of the same units.
-    pub fn add(&mut self, plan: &LanePlan, narrow: &Chunk, wide: &Chunk) {
+    pub(crate) fn add(&mut self, plan: &LanePlan, narrow: &Chunk, wide: &Chunk) {
         let thresholds = (plan.profile.criteria.ttc_threshold_s, plan.profile.criteria.btn_threshold);
         for (at, (f32, f64)) in narrow.outcomes.iter().zip(&wide.outcomes).enumerate() {
             self.lanes += 1;

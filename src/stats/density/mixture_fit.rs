@@ -34,7 +34,7 @@ impl Mixture {
     ///
     /// # Errors
     /// [`Error::Usage`] if there is no point, shapes differ, or weights are negative, not finite or all zero.
-    pub fn fit(points: &[Vec<f64>], weights: &[f64], components: usize, seed: u64) -> Result<Mixture> {
+    pub(crate) fn fit(points: &[Vec<f64>], weights: &[f64], components: usize, seed: u64) -> Result<Mixture> {
         let total: f64 = weights.iter().sum();
         let d = points.first().map_or(0, Vec::len);
         let well_formed = d > 0

@@ -290,7 +290,7 @@ impl Exposure {
 
 impl Rate {
     /// Rate of `events` in `units` hours or kilometres, > 0.
-    pub fn new(events: u64, units: f64) -> Rate {
+    pub(crate) fn new(events: u64, units: f64) -> Rate {
         let [low, high] = garwood(events, 0.95);
         let n = events as f64;
         Rate { estimate: n / units, standard_deviation: n.sqrt() / units, low: low / units, high: high / units }

@@ -66,7 +66,7 @@ pub(super) fn effective_size(weights: impl Iterator<Item = f64>) -> f64 {
 }
 
 impl<'a> Pool<'a> {
-    pub fn new(nominal: &'a dyn Density, limit_state: &'a dyn LimitState) -> Self {
+    pub(crate) fn new(nominal: &'a dyn Density, limit_state: &'a dyn LimitState) -> Self {
         Pool {
             nominal,
             limit_state,

@@ -239,7 +239,7 @@ pub(super) const AT_ONCE: usize = 64;
 pub(crate) const BATCH: u64 = 1 << 16;
 
 /// The draws of a range of indices, in order.
-pub fn draw(density: &dyn Density, stream: Stream, indices: Range<u64>) -> Vec<Option<Draw>> {
+pub(crate) fn draw(density: &dyn Density, stream: Stream, indices: Range<u64>) -> Vec<Option<Draw>> {
     indices.into_par_iter().map(|index| density.draw(&stream, index)).collect()
 }
 

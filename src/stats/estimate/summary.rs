@@ -42,7 +42,7 @@ pub struct Estimate {
 impl Estimate {
     /// Computes the derived figures.
     #[allow(clippy::too_many_arguments)]
-    pub fn new(
+    pub(crate) fn new(
         method: &str,
         probability: f64,
         variance: f64,

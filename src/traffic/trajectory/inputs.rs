@@ -118,7 +118,7 @@ impl Inputs {
     }
 
     /// Number of files of recordings.
-    pub fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.files.len()
     }
 

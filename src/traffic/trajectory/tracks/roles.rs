@@ -14,7 +14,7 @@ macro_rules! roles {
 
         impl Role {
             /// All roles.
-            pub const ALL: [Role; [$($key),*].len()] = [$(Role::$role),*];
+            pub(crate) const ALL: [Role; [$($key),*].len()] = [$(Role::$role),*];
 
             /// Its key in a preset.
             pub(crate) fn key(self) -> &'static str {
