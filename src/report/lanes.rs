@@ -162,7 +162,7 @@ pub fn case_columns(value: ColumnKind) -> Vec<Column> {
         c("model", ColumnKind::Name, "", "Driver model."),
     ];
     columns.extend(outcome_columns(value));
-    columns.push(c("robust", ColumnKind::Flag, "", "Binary64, the arithmetic of `check` and `trace`, gives the same verdicts; null for drivers of one's own."));
+    columns.push(c("robust", ColumnKind::Flag, "", "False where binary64, the arithmetic of `check` and `trace`, gives another verdict (compared near limits only); null for drivers of one's own."));
     columns
 }
 

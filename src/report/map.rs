@@ -8,6 +8,7 @@ use lanesweep_model::criterion::Criterion;
 use lanesweep_model::profile::Profile;
 use lanesweep_run::grid::{CaseStyle, CellOutcome, MappedGrid};
 use lanesweep_support::Result;
+use lanesweep_support::readable;
 use lanesweep_support::run_folder::{FIGURES, ResultFiles, Results};
 
 /// A complete run.
@@ -60,12 +61,21 @@ impl MapReport {
     fn html(&self) -> Result<String> {
         let page = Page {
             title: "Outcomes over a grid".to_owned(),
-            lead: format!("{}.", self.caption()),
+            lead: self.lead(),
             app: Some(self.explorer()?),
             sections: vec![self.host.section(&self.profile).folded()],
             ..Page::default()
         };
         Ok(page.html())
+    }
+
+    /// What the page shows.
+    fn lead(&self) -> String {
+        let simulations = readable::count(self.simulations());
+        let (criterion, profile) = (self.criterion.label(), &self.profile.name);
+        format!(
+            "Cells that fail {criterion} under {profile}: {simulations} simulations of the program, and maps that this page computes."
+        )
     }
 
     pub(super) fn is_robust(&self) -> bool {

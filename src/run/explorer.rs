@@ -51,7 +51,7 @@ const MAX_EVENT_S: f32 = 1e6;
 /// Everything that a page needs for these profiles, the first one first. Sizes of `fixed` hold in every case.
 ///
 /// # Errors
-/// None for the kinds as defined here.
+/// [`Error::Internal`] if the page's own kinds, sliders and parameters do not fit together.
 pub fn explorer(profiles: &[Profile], fixed: &[(&'static MapParameter, f64)]) -> Result<Value> {
     let defect = |error: serde_json::Error| Error::Internal(format!("the page's kinds of case: {error}"));
     let mut data: Value = serde_json::from_str(KINDS).map_err(defect)?;

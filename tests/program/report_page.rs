@@ -136,7 +136,7 @@ fn sampling_runs_maps_and_comparisons_have_their_page() {
     let case = "--set ego_speed_kmh=90 --set other_speed_kmh=50";
     quietly(dir, &format!("map cut-in --x gap_m=5..60/5 --y lateral_speed_mps=0.2..1.8/0.4 {case} --out map"));
     let html = page(&dir.join("map"));
-    for said in ["id=\"ex-map\"", "Share of cells that fail Collision"] {
+    for said in ["id=\"ex-map\"", "Cells that fail Collision under"] {
         assert!(html.contains(said), "{said}");
     }
 }

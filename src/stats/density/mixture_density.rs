@@ -1,4 +1,4 @@
-//! Densities of a mixture, at several points at once: seconds of a search are these.
+//! Densities of a mixture at several points at once. A search spends most of its time here.
 //!
 //! The sums of a point run over the components in their order, whatever the points beside it and the vectors of the
 //! processor, so a point has the same bits alone, among others and on every machine.
@@ -7,10 +7,10 @@ use super::Mixture;
 use super::bandwidth::exp_minus;
 use super::mixture::MAX_DIMENSIONS;
 
-/// Points that one loop over the components serves.
-const LANES: usize = 8;
+/// Numbers that one vector loop handles.
+pub(super) const LANES: usize = 8;
 
-/// One row of L⁻¹ after the other, each up to the diagonal: z = L⁻¹ x.
+/// z = L⁻¹ x of N points. `inverse` holds the rows of L⁻¹ up to the diagonal, one after the other.
 #[inline(always)]
 fn whiten<const N: usize>(inverse: &[f64], x: &[[f64; N]], z: &mut [[f64; N]]) {
     let mut start = 0;
@@ -33,7 +33,7 @@ pub(super) fn whitened(inverse: &[f64], point: &[f64]) -> Vec<f64> {
     z.concat()
 }
 
-/// What the components say of some points.
+/// The density of each component at some points.
 struct Parts {
     /// Component by component, relative to the largest of a point.
     parts: Vec<[f64; LANES]>,
@@ -122,21 +122,21 @@ impl Mixture {
     /// # Panics
     /// If a point has another length than the mixture has parameters.
     pub fn log_densities(&self, points: &[&[f64]]) -> Vec<f64> {
-        self.each(points, |of, lane| of.log_density(lane))
+        self.per_point(points, |of, lane| of.log_density(lane))
     }
 
     /// The fraction of each component in the density at each finite point, sum 1.
     pub fn responsibilities(&self, points: &[&[f64]]) -> Vec<Vec<f64>> {
-        self.each(points, Parts::fractions)
+        self.per_point(points, Parts::fractions)
     }
 
-    /// Both of each point.
+    /// [`Mixture::responsibilities`] and [`Mixture::log_densities`] of each point.
     pub(super) fn responsibilities_and_log_densities(&self, points: &[&[f64]]) -> Vec<(Vec<f64>, f64)> {
-        self.each(points, |of, lane| (of.fractions(lane), of.log_density(lane)))
+        self.per_point(points, |of, lane| (of.fractions(lane), of.log_density(lane)))
     }
 
-    /// One result per point, with [`Parts`] of some points at once; the last ones repeat a point where fewer are left.
-    fn each<R>(&self, points: &[&[f64]], result: impl Fn(&Parts, usize) -> R) -> Vec<R> {
+    /// One result per point. Unused lanes of the last [`Parts`] repeat the last point.
+    fn per_point<R>(&self, points: &[&[f64]], result: impl Fn(&Parts, usize) -> R) -> Vec<R> {
         let mut of = Parts::new(self.weights().len());
         let mut x = vec![[0.0; LANES]; self.dimensions()];
         let mut results = Vec::with_capacity(points.len());

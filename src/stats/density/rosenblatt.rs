@@ -3,6 +3,7 @@
 
 use super::Mixture;
 use super::bandwidth::exp_minus;
+use super::mixture_density::LANES;
 use super::normal::normal_cdf;
 
 /// Newton's steps, each within the bracket that bisection keeps; more than are ever taken.
@@ -41,9 +42,6 @@ impl Mixture {
     }
 }
 
-/// Kernels that one vector holds.
-const LANES: usize = 8;
-
 /// x with Σ w Φ((x − mean)/deviation) = Φ(u) Σ w, from the tail in which u lies, so that far tails keep their digits.
 fn quantile(parts: &[[f64; 3]], u: f64) -> f64 {
     let total: f64 = parts.iter().map(|[weight, ..]| weight).sum();
@@ -81,7 +79,7 @@ fn quantile(parts: &[[f64; 3]], u: f64) -> f64 {
     x
 }
 
-/// Some kernels side by side; those that fill a vector have no weight.
+/// Kernels side by side; unused lanes have weight 0.
 struct Kernels {
     weights: [f64; LANES],
     means: [f64; LANES],

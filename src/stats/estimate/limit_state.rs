@@ -232,7 +232,7 @@ pub(super) fn failing<L: LimitState + ?Sized>(
     Ok(failures.filter(|failure| failure.fails.contains(&true)).collect())
 }
 
-/// Points whose densities one task of a thread computes.
+/// Points whose densities one task computes.
 pub(super) const AT_ONCE: usize = 64;
 
 /// Maximum number of points drawn and evaluated at a time: bounds the memory of any sample.
