@@ -112,6 +112,16 @@ class Driver:
         Numbers for `compiled`, in binary32.
     state_rows : int
         Rows of the state of `compiled`.
+
+    Examples
+    --------
+    >>> class Coasting(lanesweep.Driver):
+    ...     may_accelerate = False
+    ...
+    ...     def acceleration(self, view, state):
+    ...         return np.where(view.other.attended, np.float32(-0.5), np.float32(0))
+    >>> lanesweep.study(synth_recordings=1, models=["FSM", Coasting()], thw=1.2).status
+    'ok'
     """
 
     name: str = ""

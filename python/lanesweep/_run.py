@@ -211,9 +211,6 @@ def run(function: str, arguments: Mapping[str, Any]) -> Result:
             default_out, path = None, None if are_several else given["convert"]
     if given.get("models") is not None:
         given["models"] = names_of(given["models"])
-    plan = given.get("plan")
-    if isinstance(plan, Result) and plan.folder is not None and (plan.folder / "plan.json").is_file():
-        given["plan"] = plan.folder / "plan.json"
     keep = None
     for name in ("scenarios", "file", "table"):
         value = given.get(name)

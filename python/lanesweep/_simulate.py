@@ -109,6 +109,12 @@ def simulate(
     ------
     InputError
         With row (from 0) and column of a wrong value.
+
+    Examples
+    --------
+    >>> cases = {"ego_speed_kmh": 60, "speed_kmh": 40, "gap_m": [5.0, 15.0], "lateral_speed_mps": 1.0}
+    >>> lanesweep.simulate(cases, category="cut-in", models="FSM")["collision"]
+    array([ True, False])
     """
     library = type(cases).__module__.split(".")[0]
     if isinstance(cases, Mapping):
@@ -179,6 +185,13 @@ class LimitState(_core.LimitState):
         `log_density(points)` evaluates it within its valid region (`is_valid(points)`).
     valid_share : float
         Fraction of the density before its truncation that lies in the valid region.
+
+    Examples
+    --------
+    >>> fitted = lanesweep.fit(synth_recordings=4, categories="cut-in", parameterizations=2)
+    >>> limit_state = lanesweep.LimitState(fitted, model="FSM", criterion="ttc", thw=0.6)
+    >>> limit_state(limit_state.draw(1000, rng=1)).shape
+    (1000,)
     """
 
     def __new__(

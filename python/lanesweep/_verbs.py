@@ -6,7 +6,7 @@ Written by ``python tools/verbs.py`` from the help of the program.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Any, Literal, TypedDict
 
 from ._result import Result
 from ._run import run
@@ -29,6 +29,7 @@ from .options import (
 )
 
 __all__ = [
+    "Case",
     "check",
     "devices",
     "fit",
@@ -40,6 +41,43 @@ __all__ = [
     "trace",
     "tracks",
 ]
+
+
+class Case(TypedDict, total=False):
+    """Numbers of one case, as a mapping; the columns of a table of cases."""
+
+    category: str
+    """Kind of scenario: cut-in, cut-out, lvd."""
+    ego_speed: Speed
+    """Initial speed of the ego, with its unit: 60km/h."""
+    speed: Speed
+    """Initial speed of the other vehicle, with its unit, by default the ego's."""
+    gap: Number
+    """Initial gap, bumper to bumper (m)."""
+    thw: Number
+    """Initial time headway instead of the gap (s)."""
+    lateral_speed: Number
+    """Cut-in, cut-out: lateral speed (m/s)."""
+    lateral_distance: Number
+    """Cut-in: lateral distance at the start; cut-out: at the end, by default the lane's width (m)."""
+    acceleration: Number
+    """Acceleration of the other vehicle; an LVD needs one, by default 0 (m/s²)."""
+    end_speed: Speed
+    """Speed at which the acceleration ends, with its unit, by default standstill, or never."""
+    ahead_speed: Speed
+    """Cut-out: speed of the vehicle ahead of the cutting-out one, with its unit, by default 0."""
+    ahead_gap: Number
+    """Cut-out: gap between the two, bumper to bumper (m)."""
+    length: Number
+    """Length of every vehicle, by default the profile's (m)."""
+    width: Number
+    """Width of every vehicle, by default the profile's (m)."""
+    ego_length: Number
+    """Length of the ego, by default that of every vehicle (m)."""
+    ego_width: Number
+    """Width of the ego, by default that of every vehicle (m)."""
+    lane_width: Number
+    """Width of the lanes, by default the scenario's, else 3.5 (m)."""
 
 
 def study(
@@ -60,9 +98,6 @@ def study(
     out: Path | None = None,
     rows: Path | None = None,
     figures: Literal["titled", "plain"] | None = None,
-    shard: str | None = None,
-    plan: Path | None = None,
-    plan_only: bool = False,
     config: Config | None = None,
     backend: Literal["auto", "cpu", "gpu"] | None = None,
     device: str | Int | None = None,
@@ -114,13 +149,6 @@ def study(
         Also write one row per lane: .csv, .jsonl or .parquet.
     figures : Literal["titled", "plain"]
         Figures with their texts, or plain ones for a paper: 88 or 180 mm wide, the texts in NAME.txt.
-    shard : str
-        Compute shard I of N (from 0); `merge` merges them. The part is written to `out`. `auto/N` takes I from a
-        Kubernetes Indexed Job or a Slurm array.
-    plan : Path
-        Run a plan that `plan_only` wrote.
-    plan_only : bool
-        Write the plan, plan.json in `out`, and stop.
     config : Config
         Configuration file, or one key of it. `lanesweep config init` writes such a file. Without `config`,
         LANESWEEP_CONFIG names it.
@@ -137,6 +165,12 @@ def study(
     Returns
     -------
     Result
+
+    Examples
+    --------
+    >>> result = lanesweep.study(synth_recordings=2, models=["Reg157", "FSM"])
+    >>> result.table("results").shape[0] > 100
+    True
     """
     return run("study", locals())
 
@@ -179,6 +213,12 @@ def tracks(
     Returns
     -------
     Result
+
+    Examples
+    --------
+    >>> recordings = lanesweep.tracks(convert="recordings", synth_recordings=1)  # in highD's format
+    >>> "nothing contradicts itself" in lanesweep.tracks(recordings).text
+    True
     """
     return run("tracks", locals())
 
@@ -220,6 +260,12 @@ def mine(
     Returns
     -------
     Result
+
+    Examples
+    --------
+    >>> mined = lanesweep.mine(lanesweep.tracks(convert="recordings", synth_recordings=1))
+    >>> lanesweep.study(scenarios=mined, thw=1.2).status
+    'ok'
     """
     return run("mine", locals())
 
@@ -291,6 +337,12 @@ def fit(
     Returns
     -------
     Result
+
+    Examples
+    --------
+    >>> fitted = lanesweep.fit(synth_recordings=4, categories="cut-in", parameterizations=2)
+    >>> list(fitted.densities)
+    ['cut-in-2']
     """
     return run("fit", locals())
 
@@ -314,9 +366,6 @@ def sample(
     rows: Path | None = None,
     failures: Path | None = None,
     out: Path | None = None,
-    shard: str | None = None,
-    plan: Path | None = None,
-    plan_only: bool = False,
     config: Config | None = None,
     backend: Literal["auto", "cpu", "gpu"] | None = None,
     device: str | Int | None = None,
@@ -372,13 +421,6 @@ def sample(
         sample.failures_limit; with the columns of `rows`. For a run in parts: `merge --failures`.
     out : Path
         Folder for estimate.json, tables and figures.
-    shard : str
-        Compute shard I of N (from 0); `merge` merges them. The part is written to `out`. `auto/N` takes I from a
-        Kubernetes Indexed Job or a Slurm array.
-    plan : Path
-        Run a plan that `plan_only` wrote.
-    plan_only : bool
-        Write the plan, plan.json in `out`, and stop.
     config : Config
         Configuration file, or one key of it. `lanesweep config init` writes such a file. Without `config`,
         LANESWEEP_CONFIG names it.
@@ -395,6 +437,13 @@ def sample(
     Returns
     -------
     Result
+
+    Examples
+    --------
+    >>> fitted = lanesweep.fit(synth_recordings=4, categories="cut-in", parameterizations=2)
+    >>> estimates = lanesweep.sample(fitted, samples=20_000, thw=0.6, models="FSM").table("estimates")
+    >>> estimates["criterion"].tolist()
+    ['collision', 'ttc', 'btn']
     """
     return run("sample", locals())
 
@@ -469,32 +518,24 @@ def map(
     Returns
     -------
     Result
+
+    Examples
+    --------
+    >>> found = lanesweep.map("cut-in", x="gap_m=5..40/5", y="lateral_speed_mps=0.5..1.5/0.5", set={"ego_speed_kmh": 60, "other_speed_kmh": 40})
+    >>> len(found.table("cells"))
+    96
     """
     return run("map", locals())
 
 
 def check(
-    file: Path | Table | Mapping[str, Any] | None = None,
+    file: Path | Case | Table | None = None,
     *,
     row: Int | None = None,
     scenario: str | None = None,
     accept_implausible: bool = False,
-    category: Category | None = None,
-    ego_speed: Speed | None = None,
-    speed: Speed | None = None,
     gap: Number | None = None,
     thw: Number | None = None,
-    lateral_speed: Number | None = None,
-    lateral_distance: Number | None = None,
-    acceleration: Number | None = None,
-    end_speed: Speed | None = None,
-    ahead_speed: Speed | None = None,
-    ahead_gap: Number | None = None,
-    length: Number | None = None,
-    width: Number | None = None,
-    ego_length: Number | None = None,
-    ego_width: Number | None = None,
-    lane_width: Number | None = None,
     models: Models | None = None,
     profiles: Paths | None = None,
     nominal: bool = False,
@@ -522,7 +563,7 @@ def check(
 
     Parameters
     ----------
-    file : Path | Table | Mapping[str, Any]
+    file : Path | Case | Table
         TOML file, table (.csv, .parquet) or scenario file (.jsonl) with the case.
     row : Int
         Row of a table, from 1 after the header, by default all rows.
@@ -530,38 +571,10 @@ def check(
         Scenario of a scenario file, by its id. It starts with its observed gap, or with `gap` or `thw`.
     accept_implausible : bool
         Use physically impossible values (a speed of 108 m/s) with a warning.
-    category : Category
-        Kind of scenario: cut-in, cut-out, lvd.
-    ego_speed : Speed
-        Initial speed of the ego, with its unit: 60km/h.
-    speed : Speed
-        Initial speed of the other vehicle, with its unit, by default the ego's.
     gap : Number, m
         Initial gap, bumper to bumper.
     thw : Number, s
         Initial time headway instead of the gap.
-    lateral_speed : Number, m/s
-        Cut-in, cut-out: lateral speed.
-    lateral_distance : Number, m
-        Cut-in: lateral distance at the start; cut-out: at the end, by default the lane's width.
-    acceleration : Number, m/s²
-        Acceleration of the other vehicle; an LVD needs one, by default 0.
-    end_speed : Speed
-        Speed at which the acceleration ends, with its unit, by default standstill, or never.
-    ahead_speed : Speed
-        Cut-out: speed of the vehicle ahead of the cutting-out one, with its unit, by default 0.
-    ahead_gap : Number, m
-        Cut-out: gap between the two, bumper to bumper.
-    length : Number, m
-        Length of every vehicle, by default the profile's.
-    width : Number, m
-        Width of every vehicle, by default the profile's.
-    ego_length : Number, m
-        Length of the ego, by default that of every vehicle.
-    ego_width : Number, m
-        Width of the ego, by default that of every vehicle.
-    lane_width : Number, m
-        Width of the lanes, by default the scenario's, else 3.5.
     models : Models
         Driver models: Reg157, CCHDM, RSS, FSM, by default all.
     profiles : Paths
@@ -593,6 +606,12 @@ def check(
     Returns
     -------
     Result
+
+    Examples
+    --------
+    >>> case = {"category": "cut-in", "ego_speed": "60km/h", "speed": "40km/h", "gap": 15, "lateral_speed": 1}
+    >>> lanesweep.check(case).status
+    'preventable'
     """
     return run("check", locals())
 
@@ -600,28 +619,14 @@ def check(
 def trace(
     *,
     case_file: Path | None = None,
-    table: Path | Table | Mapping[str, Any] | None = None,
+    table: Path | Case | Table | None = None,
     row: Int | None = None,
     scenarios: Path | Table | None = None,
     from_: Path | None = None,
     lane: Values | None = None,
     accept_implausible: bool = False,
-    category: Category | None = None,
-    ego_speed: Speed | None = None,
-    speed: Speed | None = None,
     gap: Number | None = None,
     thw: Number | None = None,
-    lateral_speed: Number | None = None,
-    lateral_distance: Number | None = None,
-    acceleration: Number | None = None,
-    end_speed: Speed | None = None,
-    ahead_speed: Speed | None = None,
-    ahead_gap: Number | None = None,
-    length: Number | None = None,
-    width: Number | None = None,
-    ego_length: Number | None = None,
-    ego_width: Number | None = None,
-    lane_width: Number | None = None,
     compare: Keys | bool | None = None,
     models: Models | None = None,
     profile: Path | None = None,
@@ -646,7 +651,7 @@ def trace(
     ----------
     case_file : Path
         TOML file with the case.
-    table : Path | Table | Mapping[str, Any]
+    table : Path | Case | Table
         Table (.csv, .parquet) with one case per row.
     row : Int
         Row of the table, from 1 after the header; needed if it has several.
@@ -660,38 +665,10 @@ def trace(
         Lane key: scenario/variant/headway/model.
     accept_implausible : bool
         Use physically impossible values (a speed of 108 m/s) with a warning.
-    category : Category
-        Kind of scenario: cut-in, cut-out, lvd.
-    ego_speed : Speed
-        Initial speed of the ego, with its unit: 60km/h.
-    speed : Speed
-        Initial speed of the other vehicle, with its unit, by default the ego's.
     gap : Number, m
         Initial gap, bumper to bumper.
     thw : Number, s
         Initial time headway instead of the gap.
-    lateral_speed : Number, m/s
-        Cut-in, cut-out: lateral speed.
-    lateral_distance : Number, m
-        Cut-in: lateral distance at the start; cut-out: at the end, by default the lane's width.
-    acceleration : Number, m/s²
-        Acceleration of the other vehicle; an LVD needs one, by default 0.
-    end_speed : Speed
-        Speed at which the acceleration ends, with its unit, by default standstill, or never.
-    ahead_speed : Speed
-        Cut-out: speed of the vehicle ahead of the cutting-out one, with its unit, by default 0.
-    ahead_gap : Number, m
-        Cut-out: gap between the two, bumper to bumper.
-    length : Number, m
-        Length of every vehicle, by default the profile's.
-    width : Number, m
-        Width of every vehicle, by default the profile's.
-    ego_length : Number, m
-        Length of the ego, by default that of every vehicle.
-    ego_width : Number, m
-        Width of the ego, by default that of every vehicle.
-    lane_width : Number, m
-        Width of the lanes, by default the scenario's, else 3.5.
     compare : Keys | bool
         Also simulate other variants of the lane's scenario. S (the recorded scenario; the default without a value),
         keys of parameterizations, or all.
@@ -725,6 +702,13 @@ def trace(
     Returns
     -------
     Result
+
+    Examples
+    --------
+    >>> case = {"category": "cut-in", "ego_speed": "60km/h", "speed": "40km/h", "gap": 15, "lateral_speed": 1}
+    >>> steps = lanesweep.trace(table=case, models="FSM").table("steps")
+    >>> steps.columns[:3]
+    ['t_s', 'x_ego_m', 'v_ego_mps']
     """
     return run("trace", locals())
 
@@ -782,5 +766,9 @@ def devices(
     Returns
     -------
     Result
+
+    Examples
+    --------
+    >>> print(lanesweep.devices())  # doctest: +SKIP
     """
     return run("devices", locals())

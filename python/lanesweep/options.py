@@ -1,4 +1,4 @@
-"""Types of arguments.
+"""Types of arguments, and lists of what exists: `PROFILES`, `MODELS`, `PARAMETERIZATIONS`, and `KEYS` of ``config``.
 
 A list may be any sequence, a set, a range, or an array of NumPy or pandas.
 """
@@ -12,7 +12,18 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from . import _core
 from ._driver import Driver
+
+_LISTS = _core.lists()
+#: Names of the profiles in the program, for `profile` and `profiles`.
+PROFILES: list[str] = _LISTS["profiles"]
+#: Names of the built-in driver models, for `models`.
+MODELS: list[str] = _LISTS["models"]
+#: Parameterizations with the features that they keep: ``"cut-in-2"``.
+PARAMETERIZATIONS: dict[str, str] = _LISTS["parameterizations"]
+#: Keys of ``config`` with their meanings.
+KEYS: dict[str, str] = _LISTS["keys"]
 
 #: A result stands for its file or folder.
 Path: TypeAlias = "str | os.PathLike[str]"

@@ -8,6 +8,7 @@ the whole run; only what the record says of the host (seconds, backend) and of s
 
 from __future__ import annotations
 
+import inspect
 import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
@@ -80,7 +81,8 @@ def plan(function: Callable[..., Result], *args: Any, shards: int = 8, **argumen
         arguments["models"] = several
     drivers = tuple((model, register(model)) for model in several if isinstance(model, Driver))
     with temporary() as folder:
-        function(*args, **arguments, plan_only=True, out=folder)
+        given = inspect.signature(function).bind(*args, **arguments).arguments
+        verb(function.__name__, {**given, "plan_only": True, "out": folder})
         content = (Path(folder) / "plan.json").read_bytes()
     return Plan(function.__name__, content, shards, drivers)
 

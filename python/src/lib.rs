@@ -22,6 +22,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(verb::main, module)?)?;
     module.add_function(wrap_pyfunction!(verb::described, module)?)?;
     module.add_function(wrap_pyfunction!(verb::profile, module)?)?;
+    module.add_function(wrap_pyfunction!(verb::lists, module)?)?;
     module.add_function(wrap_pyfunction!(frame::frame_of_columns, module)?)?;
     module.add_function(wrap_pyfunction!(frame::frame_of_stream, module)?)?;
     module.add_function(wrap_pyfunction!(cases::simulate, module)?)?;

@@ -1,6 +1,7 @@
 //! Verbs of the program inside the interpreter. The work runs on its own thread without the GIL; the calling thread looks
 //! for signals and passes on progress and messages.
 
+use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::PathBuf;
 use std::sync::Mutex;
@@ -9,6 +10,10 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 use lanesweep::cli::embedded::{self, Given};
+use lanesweep::cli::settings::Key;
+use lanesweep::model::driver::ModelId;
+use lanesweep::model::profile::Profile;
+use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::{Error, Place, Result};
 use pyo3::exceptions::{PyException, PyKeyboardInterrupt};
 use pyo3::prelude::*;
@@ -191,7 +196,7 @@ pub fn main(py: Python<'_>, words: Vec<OsString>) -> u8 {
 /// A profile of drivers and criteria, as nested dictionaries.
 #[pyfunction]
 pub fn profile<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
-    let profile = lanesweep::model::profile::Profile::load(name).map_err(|error| exception(py, &error))?;
+    let profile = Profile::load(name).map_err(|error| exception(py, &error))?;
     parsed(py, serde_json::to_string(&profile))
 }
 
@@ -199,6 +204,20 @@ pub fn profile<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> 
 #[pyfunction]
 pub fn described<'py>(py: Python<'py>, function: &str) -> PyResult<Bound<'py, PyAny>> {
     parsed(py, serde_json::to_string(&embedded::described(function).map_err(|error| exception(py, &error))?))
+}
+
+/// Names of profiles, drivers and parameterizations, and the keys of a configuration with their meanings.
+#[pyfunction]
+pub fn lists(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
+    let keys: BTreeMap<String, String> = Key::all().into_iter().map(|key| (key.name, key.description)).collect();
+    let parameterizations = Parameterization::ALL.map(|one| (one.name().replace(' ', "-"), one.description()));
+    let record = serde_json::json!({
+        "profiles": Profile::names().collect::<Vec<_>>(),
+        "models": ModelId::ALL.map(ModelId::name),
+        "parameterizations": BTreeMap::from(parameterizations),
+        "keys": keys,
+    });
+    parsed(py, serde_json::to_string(&record))
 }
 
 /// A record of the library as nested dictionaries.

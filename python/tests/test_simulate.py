@@ -39,8 +39,8 @@ def test_a_speed_has_its_unit_in_the_name_or_in_the_value_or_is_refused() -> Non
         with pytest.raises(lanesweep.InputError, match=f"{column}.*{wrong}"):
             others = {key: values for key, values in named.items() if not key.startswith(column)}
             lanesweep.simulate({**others, column: wrong}, **options)
-    with pytest.raises(lanesweep.UsageError, match="60 has no unit"):
-        lanesweep.check(category="cut-in", ego_speed=60, speed="40km/h", gap=15, lateral_speed=1)
+    with pytest.raises(lanesweep.InputError, match="60 has no unit"):
+        lanesweep.check({"category": "cut-in", "ego_speed": 60, "speed": "40km/h", "gap": 15, "lateral_speed": 1})
 
 
 def test_every_case_has_its_own_id() -> None:
@@ -65,7 +65,7 @@ def test_a_row_is_the_case_that_trace_runs() -> None:
         at = row["case"]
         with_unit = {"mps": "{}m/s", "m": "{}m"}
         case = {key.rsplit("_", 1)[0]: with_unit[key.rsplit("_", 1)[1]].format(values[at]) for key, values in CASES.items()}
-        traced = lanesweep.trace(category="cut-in", models="FSM", **case).document["lanes"][0]
+        traced = lanesweep.trace(table={"category": "cut-in", **case}, models="FSM").document["lanes"][0]
         outcome = traced.get("outcome", traced)
         assert outcome["collision"] == row["collision"]
         # A trace is in binary64.
@@ -86,7 +86,7 @@ def test_a_case_within_rounding_of_a_limit_is_not_robust_and_the_reference_is_wh
     assert np.array_equal(ours["robust"], ~differs) and reference["robust"].all()
     for at, model in ((0, "FSM"), (2, "CCHDM")):
         case = {name.removesuffix("_mps"): f"{values[at]!r}{'m' if name == 'gap' else 'm/s'}" for name, values in cases.items()}
-        traced = lanesweep.trace(category="cut-in", models=model, **case).table("lanes")
+        traced = lanesweep.trace(table={"category": "cut-in", **case}, models=model).table("lanes")
         for name in ("collision", "ttc", "btn", "min_ttc_s", "min_gap_m", "end_s"):
             assert traced[name][0] == reference[name][2 * at + (model == "CCHDM")], name
     rng = np.random.default_rng(1)

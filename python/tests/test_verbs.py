@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import doctest
 import importlib.util
 import json
 import logging
@@ -29,6 +30,20 @@ def test_the_functions_are_those_of_the_program() -> None:
     verbs = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(verbs)
     assert verbs.module() == (tools.parents[1] / "lanesweep" / "_verbs.py").read_text(encoding="utf-8"), f"run {tools}"
+
+
+@pytest.mark.parametrize("module", [lanesweep, lanesweep._verbs, lanesweep._simulate, lanesweep._driver])
+def test_examples_in_docstrings_print_what_they_say(module, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    found = doctest.testmod(module, extraglobs={"lanesweep": lanesweep})
+    assert found.attempted > 0 and found.failed == 0
+
+
+def test_lists_have_what_the_verbs_take() -> None:
+    options = lanesweep.options
+    assert options.MODELS == ["Reg157", "CCHDM", "RSS", "FSM"] and len(options.PARAMETERIZATIONS) == 19
+    assert all(lanesweep.profile(name) for name in options.PROFILES)
+    assert "time step" in options.KEYS["run.dt_s"].lower()
 
 
 def test_a_study_has_the_bytes_of_the_command_line(program, scenarios, tmp_path) -> None:
@@ -112,9 +127,9 @@ def test_every_table_of_every_verb_opens_with_one_schema_whatever_its_values(sce
     table.write_text("category,ego_speed_kmh,speed_kmh,gap,lateral_speed\ncut-in,60,40,15,1\ncut-in,90,40,5,1\n")
     grid = {"x": "deceleration_mps2=2,4", "set": {"thw_s": 1.2}, "models": "FSM"}
     calls = {
-        "check": [lambda: lanesweep.check(**CASE), lambda: lanesweep.check(**{**CASE, "gap": 400, "speed": "108km/h"})],
+        "check": [lambda: lanesweep.check(CASE), lambda: lanesweep.check({**CASE, "gap": 400, "speed": "108km/h"})],
         "rows": [lambda: lanesweep.check(table)],
-        "trace": [lambda: lanesweep.trace(**CASE), lambda: lanesweep.trace(**{**CASE, "gap": 400, "speed": "108km/h"})],
+        "trace": [lambda: lanesweep.trace(table=CASE), lambda: lanesweep.trace(table={**CASE, "gap": 400, "speed": "108km/h"})],
         # Without and with failures, without and with intervals, of some categories.
         "study": [lambda: lanesweep.study(scenarios=scenarios), lambda: lanesweep.study(scenarios=scenarios, models="FSM", thw=9, categories="cut-in")],
         "sample": [lambda: lanesweep.sample(density, samples=10, thw=9, models="FSM"), lambda: lanesweep.sample(density, samples=3000, thw=0.4)],
@@ -138,13 +153,13 @@ def test_every_table_of_every_verb_opens_with_one_schema_whatever_its_values(sce
                 assert all(name in shown for name in frame.columns[:1])
     best = lanesweep.study(scenarios=scenarios, models="FSM", thw=0.6).table("best")
     assert "interval" in best.descriptions["f1_low"] and "f1" not in best.descriptions and best.units["failing_scenarios"] == "1"
-    drivers = lanesweep.check(**{**CASE, "gap": 400, "speed": "108km/h"}).table("profiles")
-    assert np.isinf(drivers["min_ttc_s"]).any() and np.isinf(lanesweep.trace(**CASE, models="FSM").table("lanes")["max_drac_mps2"]).all()
+    drivers = lanesweep.check({**CASE, "gap": 400, "speed": "108km/h"}).table("profiles")
+    assert np.isinf(drivers["min_ttc_s"]).any() and np.isinf(lanesweep.trace(table=CASE, models="FSM").table("lanes")["max_drac_mps2"]).all()
 
 
 def test_a_row_of_a_frame_is_a_case_of_check_and_trace() -> None:
     frame = pl.DataFrame({"category": "cut-in", "ego_speed_kmh": [108.0, 60.0], "speed_kmh": 40.0, "gap_m": [25.0, 15.0], "lateral_speed_mps": 1.0, "length": None})
-    expected = [lanesweep.check(**CASE), lanesweep.trace(**CASE, models="FSM")]
+    expected = [lanesweep.check(CASE), lanesweep.trace(table=CASE, models="FSM")]
     for row in (frame.row(0, named=True), frame.to_pandas().iloc[0]):
         found = [lanesweep.check(row), lanesweep.trace(table=row, models="FSM")]
         for ours, theirs, name in zip(found, expected, ("profiles", "lanes"), strict=True):
@@ -188,9 +203,9 @@ def test_a_time_limit_is_no_interrupt(density, tmp_path) -> None:
 
 
 def test_a_check_has_its_answer_as_status() -> None:
-    safe = lanesweep.check(category="cut-in", ego_speed="60km/h", speed="40km/h", gap=30, lateral_speed=1)
+    safe = lanesweep.check({"category": "cut-in", "ego_speed": "60km/h", "speed": "40km/h", "gap": 30, "lateral_speed": 1})
     assert safe.status == "preventable" and "preventable" in str(safe.document).lower()
-    close = lanesweep.check(category="cut-in", ego_speed="60km/h", speed="20km/h", gap=10, lateral_speed=1)
+    close = lanesweep.check({"category": "cut-in", "ego_speed": "60km/h", "speed": "20km/h", "gap": 10, "lateral_speed": 1})
     assert close.status == "not preventable"
 
 
@@ -349,10 +364,7 @@ def test_values_keep_their_meaning_and_names_their_letters(density, scenarios, t
     # A path is one path, whatever it holds; a result stands for what a function reads of it.
     odd = tmp_path / "a,b c.json"
     odd.write_bytes(density.read_bytes())
-    planned = lanesweep.sample(odd, samples=200, thw=1.2, plan_only=True, out=tmp_path / "plan", **tiny)
-    from_plan = lanesweep.sample(plan=planned, out=tmp_path / "run", backend="cpu")
-    whole = lanesweep.sample(odd, samples=np.int64(200), thw=np.float32(1.2), **tiny)
-    assert from_plan.table("estimates").to_polars().rows(named=True) == whole.table("estimates").to_polars().rows(named=True)
+    assert lanesweep.sample(odd, samples=np.int64(200), thw=np.float32(1.2), **tiny).status == "ok"
     headways = [np.array([0.6], dtype="float32"), pd.Series([0.6], dtype="Float32"), {0.6}, (0.6,), np.array(0.6)]
     studies = [lanesweep.study(scenarios=scenarios, thw=thw, **tiny).table("results").to_polars().rows(named=True) for thw in headways]
     assert all(study == studies[0] for study in studies)
@@ -361,9 +373,9 @@ def test_values_keep_their_meaning_and_names_their_letters(density, scenarios, t
     assert lanesweep.map("cut-in", panel=panels, config={"run": {"dt_s": 0.02}}, **options, **tiny).status == "ok"
     case = {"category": "cut-in", "ego_speed": "60km/h", "speed": "40km/h", "gap": 15, "lateral_speed": 1.0}
     for call, kind, message in [
-        (lambda: lanesweep.check(**case, gap_=3), TypeError, "unexpected keyword argument 'gap_'"),
-        (lambda: lanesweep.check(**case, quiet=True), TypeError, "unexpected keyword argument 'quiet'"),
-        (lambda: lanesweep.check(**case, row=7), lanesweep.UsageError, "`row`: it needs `file`"),
+        (lambda: lanesweep.check(case, gap_=3), TypeError, "unexpected keyword argument 'gap_'"),
+        (lambda: lanesweep.check(case, quiet=True), TypeError, "unexpected keyword argument 'quiet'"),
+        (lambda: lanesweep.check(row=7), lanesweep.UsageError, "`row`: it needs `file`"),
         (lambda: lanesweep.trace(from_=tmp_path), lanesweep.UsageError, "`from_`: it needs `lane`"),
         (lambda: lanesweep.study(scenarios), lanesweep.UsageError, "give it as `scenarios`"),
         (lambda: lanesweep.study(scenarios=scenarios, out=""), lanesweep.UsageError, "`out`: it is empty"),

@@ -14,12 +14,56 @@ from typing import Any
 from lanesweep import _core
 
 FUNCTIONS = ["study", "tracks", "mine", "fit", "sample", "map", "check", "trace", "merge", "devices"]
+#: Numbers of a case: in Python a mapping, or a row of a table, has them.
+CASE = """category ego_speed speed gap thw lateral_speed lateral_distance acceleration end_speed ahead_speed ahead_gap
+    length width ego_length ego_width lane_width""".split()
+#: Arguments that a function of Python leaves out: a recorded scenario starts at a headway of its own, `lanesweep.parts` splits runs.
+ELSEWHERE = {"check": set(CASE) - {"gap", "thw"}, "trace": set(CASE) - {"gap", "thw"}, "study": ["shard", "plan", "plan_only"], "sample": ["shard", "plan", "plan_only"]}
+#: What a function does, as Python that the tests run.
+EXAMPLES = {
+    "study": """
+        >>> result = lanesweep.study(synth_recordings=2, models=["Reg157", "FSM"])
+        >>> result.table("results").shape[0] > 100
+        True""",
+    "tracks": """
+        >>> recordings = lanesweep.tracks(convert="recordings", synth_recordings=1)  # in highD's format
+        >>> "nothing contradicts itself" in lanesweep.tracks(recordings).text
+        True""",
+    "mine": """
+        >>> mined = lanesweep.mine(lanesweep.tracks(convert="recordings", synth_recordings=1))
+        >>> lanesweep.study(scenarios=mined, thw=1.2).status
+        'ok'""",
+    "fit": """
+        >>> fitted = lanesweep.fit(synth_recordings=4, categories="cut-in", parameterizations=2)
+        >>> list(fitted.densities)
+        ['cut-in-2']""",
+    "sample": """
+        >>> fitted = lanesweep.fit(synth_recordings=4, categories="cut-in", parameterizations=2)
+        >>> estimates = lanesweep.sample(fitted, samples=20_000, thw=0.6, models="FSM").table("estimates")
+        >>> estimates["criterion"].tolist()
+        ['collision', 'ttc', 'btn']""",
+    "map": """
+        >>> found = lanesweep.map("cut-in", x="gap_m=5..40/5", y="lateral_speed_mps=0.5..1.5/0.5", set={"ego_speed_kmh": 60, "other_speed_kmh": 40})
+        >>> len(found.table("cells"))
+        96""",
+    "check": """
+        >>> case = {"category": "cut-in", "ego_speed": "60km/h", "speed": "40km/h", "gap": 15, "lateral_speed": 1}
+        >>> lanesweep.check(case).status
+        'preventable'""",
+    "trace": """
+        >>> case = {"category": "cut-in", "ego_speed": "60km/h", "speed": "40km/h", "gap": 15, "lateral_speed": 1}
+        >>> steps = lanesweep.trace(table=case, models="FSM").table("steps")
+        >>> steps.columns[:3]
+        ['t_s', 'x_ego_m', 'v_ego_mps']""",
+    "devices": """
+        >>> print(lanesweep.devices())  # doctest: +SKIP""",
+}
 #: Types of arguments, by their names.
 NAMES = {
     "categories": "Categories", "category": "Category", "compare": "Keys | bool", "config": "Config", "criterion": "Criterion",
-    "device": "str | Int", "external": "Paths | Mapping[str, Any]", "file": "Path | Table | Mapping[str, Any]", "lane": "Values", "models": "Models",
+    "device": "str | Int", "external": "Paths | Mapping[str, Any]", "file": "Path | Case | Table", "lane": "Values", "models": "Models",
     "panel": "Values", "parameterizations": "Keys", "paths": "Paths", "profiles": "Paths", "proposal": "Path",
-    "scenarios": "Path | Table", "set": "Values", "table": "Path | Table | Mapping[str, Any]", "thw": "Headways",
+    "scenarios": "Path | Table", "set": "Values", "table": "Path | Case | Table", "thw": "Headways",
 }  # fmt: skip
 #: Types of arguments, by the names of their values on the command line.
 VALUES = {
@@ -35,7 +79,7 @@ Written by ``python tools/verbs.py`` from the help of the program.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Any, Literal, TypedDict
 
 from ._result import Result
 from ._run import run
@@ -93,6 +137,8 @@ def written(function: str) -> tuple[str, set[str]]:
     types: set[str] = set()
     positions, others, documented = [], [], []
     for argument in sorted(verb["arguments"], key=lambda one: not one["is_position"]):
+        if argument["name"] in ELSEWHERE.get(function, ()):
+            continue
         name, annotation = python_name(argument["name"]), type_of(argument, function)
         types |= set(re.findall(r"\b[A-Z]\w+", re.sub(r'"[^"]*"', "", annotation)))
         default = "" if argument["is_required"] else " = False" if annotation == "bool" else " = None"
@@ -104,18 +150,30 @@ def written(function: str) -> tuple[str, set[str]]:
     signature = "\n".join([*positions, "    *,", *others])
     about, _, more = verb["about"].partition("\n\n")
     doc = f'    """{sentence(about)}\n\n' + (paragraphs(more, "    ") + "\n\n" if more else "")
-    doc += "    Parameters\n    ----------\n" + "\n".join(documented) + '\n\n    Returns\n    -------\n    Result\n    """'
+    doc += "    Parameters\n    ----------\n" + "\n".join(documented) + '\n\n    Returns\n    -------\n    Result\n'
+    if function in EXAMPLES:
+        doc += "\n    Examples\n    --------\n" + textwrap.indent(textwrap.dedent(EXAMPLES[function]).strip(), "    ") + "\n"
+    doc += '    """'
     body = f'    return run("{function}", locals())'
     return f"\n\ndef {function}(\n{signature}\n) -> Result:\n{doc}\n{body}\n", types
+
+
+def case() -> str:
+    """The source of `Case`."""
+    known = {one["name"]: one for one in _core.described("check")["arguments"]}
+    types = {name: "str" if name == "category" else "Speed" if "speed" in name and name != "lateral_speed" else "Number" for name in CASE}
+    units = {name: f" ({known[name]['value']})" if types[name] == "Number" else "" for name in CASE}
+    keys = "".join(f'    {name}: {types[name]}\n    """{sentence(known[name]["help"] + units[name])}"""\n' for name in CASE)
+    return f'\n\nclass Case(TypedDict, total=False):\n    """Numbers of one case, as a mapping; the columns of a table of cases."""\n\n{keys}'
 
 
 def module() -> str:
     """The source of `_verbs.py`."""
     made = [written(function) for function in FUNCTIONS]
-    types = sorted(set().union(*(types for _, types in made)) - {"Any", "Literal", "Mapping", "None"})
-    names = "".join(f'\n    "{name}",' for name in sorted(FUNCTIONS))
+    types = sorted(set().union({"Number", "Speed"}, *(types for _, types in made)) - {"Any", "Case", "Literal", "Mapping", "None"})
+    names = "".join(f'\n    "{name}",' for name in sorted(["Case", *FUNCTIONS]))
     head = HEAD.format(types="(" + "".join(f"\n    {one}," for one in types) + "\n)", names=names + "\n")
-    return head + "".join(text for text, _ in made)
+    return head + case() + "".join(text for text, _ in made)
 
 
 if __name__ == "__main__":
