@@ -64,6 +64,9 @@ fn main() {
         write_sources(kernel, &out);
     }
     eprintln!("{} kernels of {} profiles", kernels.len(), profiles.len());
+    if args.iter().any(|arg| arg == "--sources") {
+        return;
+    }
     println!("device,kernel,statistic,value");
     // SAFETY: the loader is Vulkan's; the instance and all devices are destroyed after their last use.
     unsafe { compile_all(&kernels, &out) };
