@@ -16,7 +16,7 @@ use lanesweep_support::{Error, Place, Result, option};
 
 /// One other vehicle of a lane.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
 pub struct LaneOther<R> {
     /// Its motion.
     pub motion: Motion<R>,
@@ -41,7 +41,7 @@ pub struct LaneOther<R> {
 
 /// Data that all lanes of one case share.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
 pub struct LaneCase<R> {
     /// Principal vehicle, then the one ahead of it.
     pub others: [LaneOther<R>; 2],
@@ -147,11 +147,10 @@ fn encode_other(
         half_lengths: (case.ego_length_m + other.length_m) / 2.0,
         half_widths: (case.ego_width_m + other.width_m) / 2.0,
         gap_offset,
-        present_from: 0,
         present_until: NEVER,
-        attend_from: [0; MODELS],
         used: 1,
         judged: 1,
+        ..LaneOther::default()
     }
 }
 

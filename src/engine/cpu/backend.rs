@@ -253,7 +253,7 @@ impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
                     tasks.for_each(|(k, lanes)| run.verdicts(block, task(k), lanes));
                 }
                 Wanted::Outcomes => {
-                    outcomes.resize(from + count * per_unit, Outcome::NONE);
+                    outcomes.resize(from + count * per_unit, Outcome::default());
                     let tasks =
                         outcomes[from..].par_chunks_mut(task_lanes).zip(verdicts[from..].par_chunks_mut(task_lanes));
                     tasks.enumerate().for_each(|(k, (lanes, verdicts))| {

@@ -144,7 +144,7 @@ pub(crate) fn run_lanes(
     let simulation = &setting.simulation(cases.iter().any(|case| case.pair != 0));
     let mut lanes = SideBySide::new(simulation, cases.iter().zip(tracks), entries, starts);
     // Every lane gets its outcome below.
-    let mut outcomes = vec![Outcome::NONE; lanes.count()];
+    let mut outcomes = vec![Outcome::default(); lanes.count()];
     let mut accelerations = setting.driver.start(lanes.count(), setting.dt_s)?;
     lanes.columns.dt_s = setting.dt_s;
     lanes.columns.state = vec![0.0; setting.driver.state_rows() * lanes.columns.stride];

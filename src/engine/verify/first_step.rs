@@ -155,7 +155,7 @@ impl ThresholdCases {
         // The smallest relevant gap: centres side by side.
         let nearest = -s.half_lengths;
         let signed = |draw: &mut CaseRandom, gap: f32| if gap < -nearest && draw.chance(0.25) { -gap } else { gap };
-        let judged = |gap: f32| criteria.btn.update(BrakeThreatMaximum::new(), Flag::TRUE, gap, dv, true);
+        let judged = |gap: f32| criteria.btn.update(BrakeThreatMaximum::start(), Flag::TRUE, gap, dv, true);
         let fsm = &constants.fsm;
         s.gap = match on {
             Threshold::Ttc => criteria.ttc.threshold * dv,
