@@ -269,7 +269,7 @@ impl LimitState {
                 }
                 None => {
                     let failures = fails.iter().filter(|fails| **fails).count() as u64;
-                    let counts = Counts { runs: valid, failures, voids: 0, tries: points.len() as u64 };
+                    let counts = Counts { runs: valid, failures, voids: 0 };
                     let mut estimate = from_counts(&counts, level, StopReason::Samples);
                     estimate.trust.warnings.push(Warning::DataLeftOut);
                     estimate

@@ -187,18 +187,6 @@ impl ParameterSpace {
         self.has_thw.then(|| point[point.len() - 1])
     }
 
-    /// Index of the parameter with this name.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] with the valid names and the most similar one.
-    pub fn index_of(&self, name: &str) -> Result<usize> {
-        if let Some(index) = self.parameters.iter().position(|p| p.name == name) {
-            return Ok(index);
-        }
-        let names = self.parameters.iter().map(|p| p.name.as_str());
-        Err(Error::unknown(Place::item(self.id.name()), "parameter", name, names, ""))
-    }
-
     /// The parameters with the bounds of a draw.
     pub fn drawn_parameters(&self) -> &[Parameter] {
         &self.drawn
