@@ -75,7 +75,7 @@ fn open(
         None => SampleHeadways::Sampled,
         Some(text) => SampleHeadways::Each(vec![headway_of(&text)?]),
     };
-    let backend = OpenBackend::open(backend.parse()?, device.map(str::parse).transpose()?.as_ref())?;
+    let backend = OpenBackend::open(backend.parse()?, device)?;
     let opened = Opened {
         density,
         profile: Profile::load(profile)?,

@@ -83,7 +83,7 @@ pub fn run_lane<R: Real>(
     start: Start<R>,
     mut observer: &mut dyn FnMut(&Step<R>),
 ) -> Outcome<R> {
-    constants.run(model, case, tables, start, &mut observer)
+    constants.run(model, case, tables, start, observer)
 }
 
 /// Random lanes of each model and category.

@@ -13,7 +13,6 @@ use crate::cpu::series::{Series, max_entries};
 use crate::cpu::simd::Instructions;
 use crate::drivers::Constants;
 use crate::frame::Start;
-use crate::lane::Silent;
 use crate::lane_case::LaneCase;
 use crate::outcome::{Outcome, Verdicts};
 use crate::plan::{LaneKey, LanePlan};
@@ -93,7 +92,7 @@ impl<'p, R: Real> LaneRunner<'p, R> {
             &case,
             &tables,
             self.starts[key.headway],
-            &mut Silent,
+            |_| {},
         )
     }
 
@@ -165,7 +164,7 @@ impl<'p, R: Real> LaneRunner<'p, R> {
         } else {
             Scene { may_cross, ..Scene::unknown(case.pair != 0) }
         };
-        self.constants[block].run_in(model, criteria, scene, case, tables, start, &mut Silent)
+        self.constants[block].run_in(model, criteria, scene, case, tables, start, |_| {})
     }
 }
 

@@ -111,7 +111,7 @@ pub(super) fn case<R: Real>(recipe: &Recipe, basis: &[f32], point: &[f32], table
     let marking_gap = (lane_width - ego_width) * R::HALF;
     let geometry = LaneGeometry { half_widths: first.half_widths, lane_width, marking_gap };
     for (model, rule) in recipe.attention.iter().enumerate() {
-        let [of_principal, of_ahead] = rule.widen::<R>().attend_from(
+        let [of_principal, of_ahead] = rule.cast::<R>().attend_from(
             steps_seen(recipe, &first.motion),
             geometry,
             |step| first.motion.lateral(tables, step).position,
