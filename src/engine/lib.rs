@@ -43,7 +43,7 @@ pub use device_choice::BackendChoice;
 pub use drivers::Constants;
 pub use executor::{Executor, SweepSummary, chunks};
 pub use frame::{Frame, Start};
-pub use lane::Step;
+pub use lane::{Step, silent};
 pub use lane_case::attention_rules;
 pub use lane_case::{LaneCase, LaneOther, check_time_step};
 pub use lane_step::Seen;

@@ -206,7 +206,7 @@ mod tests {
     use crate::cpu::series::Series;
     use crate::drivers::Constants;
     use crate::frame::Simulation;
-    use crate::lane::run_lane;
+    use crate::lane::{run_lane, silent};
     use crate::scene::{Scene, fastest_in, may_cross};
     use crate::verify::{SetOptions, random_plan};
     use crate::{Backend, CpuBackend, Executor, LaneCase, Session, SweepSummary, Wanted};
@@ -322,7 +322,7 @@ mod tests {
             let (model_index, scene) = (self.id.index(), Scene::unknown(case.pair != 0));
             let simulation = Simulation { frame, criteria, model: &self.model, model_index, scene };
             let start = self.plan.headways[key.headway].start();
-            run_lane(&simulation, &case, &self.plan.tables().cast(), start, |_| {})
+            run_lane(&simulation, &case, &self.plan.tables().cast(), start, silent)
         }
 
         fn batched(&self, keys: &[LaneKey], each: &mut dyn FnMut(usize, Verdicts)) {

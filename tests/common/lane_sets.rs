@@ -81,7 +81,7 @@ pub fn run_lane<R: Real>(
     model: ModelId,
     (case, tables): (&LaneCase<R>, &Tables<R>),
     start: Start<R>,
-    mut observer: &mut dyn FnMut(&Step<R>),
+    observer: &mut dyn FnMut(&Step<R>),
 ) -> Outcome<R> {
     constants.run(model, case, tables, start, observer)
 }

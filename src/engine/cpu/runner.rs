@@ -13,6 +13,7 @@ use crate::cpu::series::{Series, max_entries};
 use crate::cpu::simd::Instructions;
 use crate::drivers::Constants;
 use crate::frame::Start;
+use crate::lane::silent;
 use crate::lane_case::LaneCase;
 use crate::outcome::{Outcome, Verdicts};
 use crate::plan::{LaneKey, LanePlan};
@@ -92,7 +93,7 @@ impl<'p, R: Real> LaneRunner<'p, R> {
             &case,
             &tables,
             self.starts[key.headway],
-            |_| {},
+            silent,
         )
     }
 
@@ -164,7 +165,7 @@ impl<'p, R: Real> LaneRunner<'p, R> {
         } else {
             Scene { may_cross, ..Scene::unknown(case.pair != 0) }
         };
-        self.constants[block].run_in(model, criteria, scene, case, tables, start, |_| {})
+        self.constants[block].run_in(model, criteria, scene, case, tables, start, silent)
     }
 }
 

@@ -105,7 +105,6 @@ impl ParameterSpace {
         with_thw: bool,
     ) -> Result<ParameterSpace> {
         options.validate()?;
-        id.validate()?;
         let place = || Place::item(id.name());
         let variables = id.variables();
         if id.category == Category::CutIn
