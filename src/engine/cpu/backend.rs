@@ -109,17 +109,17 @@ impl Backend for CpuBackend {
             return Ok(lane_by_lane(plan, LaneRunner::<f64>::new(plan)));
         }
         let (runner, instructions) = (LaneRunner::<f32>::new(plan).every_step(self.every_step), self.instructions);
-        if instructions == Instructions::Scalar {
+        if !runner.runs_in_batches(instructions) {
             return Ok(lane_by_lane(plan, runner));
         }
-        let (in_batches, runner) = (runner.runs_in_batches(instructions), Arc::new(runner));
+        let runner = Arc::new(runner);
         let same = runner.clone();
         let verdicts: Run<'p, Verdicts> =
             Box::new(move |block, units, each| same.run_units::<Verdicts>(instructions, block, units, each));
         let outcomes: Run<'p, Outcome<f64>> = Box::new(move |block, units, each| {
             runner.run_units(instructions, block, units, |at, outcome: Outcome<f32>| each(at, outcome.widen()));
         });
-        Ok(Box::new(CpuSession { plan, in_batches, verdicts, outcomes }))
+        Ok(Box::new(CpuSession { plan, in_batches: true, verdicts, outcomes }))
     }
 }
 
