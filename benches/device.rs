@@ -15,9 +15,7 @@ use std::time::Instant;
 use common::{lane_steps, paper_size_scenarios};
 use counting::{Counting, OperationCount};
 use lanesweep::engine::gpu::{Adapters, GpuBackend, GpuOptions, choose};
-use lanesweep::engine::{
-    Backend, BackendChoice, CpuBackend, DeviceName, Executor, Headway, LanePlan, LaneRunner, Wanted,
-};
+use lanesweep::engine::{Backend, BackendChoice, CpuBackend, Executor, Headway, LanePlan, LaneRunner, Wanted};
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::study::{StudyOptions, plan_study};
@@ -32,9 +30,9 @@ fn main() {
     let value = |flag: &str| args.iter().position(|a| a == flag).and_then(|at| args.get(at + 1));
     let headways = value("--headways").map_or(10, |n| n.parse().expect("--headways N"));
     let repetitions = value("--repetitions").map_or(3, |n| n.parse().expect("--repetitions N"));
-    let name = value("--device").map(|n| n.parse::<DeviceName>().expect("--device NAME"));
+    let name = value("--device").map(String::as_str);
     let adapters = Adapters::enumerate();
-    let index = choose(adapters.cards(), BackendChoice::Gpu, name.as_ref()).expect("a device").expect("a device");
+    let index = choose(adapters.cards(), BackendChoice::Gpu, name).expect("a device").expect("a device");
     let mut per_invocation: Vec<Option<u32>> = args
         .windows(2)
         .filter(|pair| pair[0] == "--lanes-per-invocation")

@@ -170,7 +170,7 @@ fn crude(case: &Case, draws: u64) {
     let started = Instant::now();
     let (failures, shares) = case.with(|density, limit_state| {
         let failures = limit_state.failures(density, Stream { seed: 5, purpose: 77 }, 0..draws).expect("failures");
-        let mixture = density.mixture().expect("kernels");
+        let mixture = density.mixture();
         let kernel = |k: usize| {
             Mixture::new(vec![1.0], vec![mixture.mean(k).to_vec()], vec![mixture.factor(k).clone()], vec![0])
         };

@@ -226,7 +226,7 @@ fn plan(scenarios: &[Scenario], categories: Vec<Category>, models: Vec<ModelId>,
     plan_study(scenarios, &Profile::load("paper").unwrap(), &options).unwrap()
 }
 
-fn run(plan: &LanePlan, backend: &CpuBackend<f32>) {
+fn run(plan: &LanePlan, backend: &CpuBackend) {
     Executor::new(backend).sweep(plan, 0..plan.unit_count(), Wanted::Verdicts, |_| Ok(())).unwrap();
 }
 

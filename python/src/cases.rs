@@ -282,7 +282,7 @@ fn options(
             return Err(Error::usage(Place::option("reference"), problem, "leave out the device, or `reference`"));
         }
         true => OpenBackend::reference(),
-        false => OpenBackend::open(backend.parse()?, device.map(str::parse).transpose()?.as_ref())?,
+        false => OpenBackend::open(backend.parse()?, device)?,
     };
     Ok(Options {
         category,

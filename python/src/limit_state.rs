@@ -75,7 +75,7 @@ fn open(
         None => SampleHeadways::Sampled,
         Some(text) => SampleHeadways::Each(vec![headway_of(&text)?]),
     };
-    let backend = OpenBackend::open(backend.parse()?, device.map(str::parse).transpose()?.as_ref())?;
+    let backend = OpenBackend::open(backend.parse()?, device)?;
     let opened = Opened {
         density,
         profile: Profile::load(profile)?,
@@ -269,7 +269,7 @@ impl LimitState {
                 }
                 None => {
                     let failures = fails.iter().filter(|fails| **fails).count() as u64;
-                    let counts = Counts { runs: valid, failures, voids: 0, tries: points.len() as u64 };
+                    let counts = Counts { runs: valid, failures, voids: 0 };
                     let mut estimate = from_counts(&counts, level, StopReason::Samples);
                     estimate.trust.warnings.push(Warning::DataLeftOut);
                     estimate

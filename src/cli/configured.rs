@@ -16,7 +16,7 @@ use super::{COMMIT, Cli, Verb};
 use crate::settings::{
     Assignment, FILE_VARIABLE, Key, KeyFlag, KeyKind, Layers, Origin, Setting, Settings, keys_in_order,
 };
-use lanesweep_engine::{BackendChoice, DeviceName, Executor, OpenBackend};
+use lanesweep_engine::{BackendChoice, Executor, OpenBackend};
 use lanesweep_model::profile::Profile;
 use lanesweep_report::host::{Host, SettingRecord};
 use lanesweep_support::plain_text::nearest;
@@ -371,12 +371,11 @@ impl Configured {
     /// The requested backend and device.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a text that is not a device name, and for a device of the CPU, with the source of both.
-    pub(super) fn backend(&self) -> Result<(BackendChoice, Option<DeviceName>)> {
+    /// [`Error::Usage`] for a device of the CPU, with the source of both.
+    pub(super) fn backend(&self) -> Result<(BackendChoice, Option<&str>)> {
         let run = &self.settings.run;
-        let device = run.device.as_deref().map(str::parse).transpose();
-        let device: Option<DeviceName> = device.map_err(|error| self.at_origin("run.device", "device", error))?;
-        run.backend.check(device.as_ref()).map_err(|error| {
+        let device = run.device.as_deref();
+        run.backend.check(device).map_err(|error| {
             let [backend, device] = ["run.backend", "run.device"]
                 .map(|key| self.layers.get(key).map_or_else(Place::default, |setting| setting.origin.place(key)));
             let named = run.device.as_deref().unwrap_or_default();
@@ -392,7 +391,7 @@ impl Configured {
     /// As [`Configured::backend`] and [`OpenBackend::open`].
     pub(super) fn open(&self) -> Result<OpenBackend> {
         let (backend, device) = self.backend()?;
-        Ok(OpenBackend::open(backend, device.as_ref())?.with_cancel(CANCEL.clone()))
+        Ok(OpenBackend::open(backend, device)?.with_cancel(CANCEL.clone()))
     }
 
     /// The same, or the CPU in binary64, which allows no other backend.
@@ -418,6 +417,6 @@ impl Configured {
     /// As [`Configured::backend`] and [`OpenBackend::open_to_verify`].
     pub(super) fn open_to_verify(&self) -> Result<OpenBackend> {
         let (backend, device) = self.backend()?;
-        OpenBackend::open_to_verify(backend, device.as_ref())
+        OpenBackend::open_to_verify(backend, device)
     }
 }

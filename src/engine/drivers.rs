@@ -13,7 +13,7 @@ use super::cpu::pending_lanes::Lanes;
 use super::cpu::shared_rules::Rules;
 use super::cpu::simd::Instructions;
 use super::frame::{Frame, Simulation, Start};
-use super::lane::{Observer, run_lane};
+use super::lane::{Step, run_lane};
 use super::lane_case::LaneCase;
 use super::outcome::Outcome;
 use super::scene::Scene;
@@ -56,7 +56,7 @@ macro_rules! declare_constants {
                 case: &LaneCase<R>,
                 tables: &Tables<R>,
                 start: Start<R>,
-                observer: &mut impl Observer<R>,
+                observer: impl FnMut(&Step<R>),
             ) -> Outcome<R> {
                 self.run_in(id, &self.criteria, Scene::unknown(case.pair != 0), case, tables, start, observer)
             }
@@ -72,7 +72,7 @@ macro_rules! declare_constants {
                 case: &LaneCase<R>,
                 tables: &Tables<R>,
                 start: Start<R>,
-                observer: &mut impl Observer<R>,
+                observer: impl FnMut(&Step<R>),
             ) -> Outcome<R> {
                 let model_index = id.index();
                 let frame = &self.frames[model_index];
@@ -139,7 +139,7 @@ fn foreign_lane<R: Real>(
     case: &LaneCase<R>,
     tables: &Tables<R>,
     start: Start<R>,
-    observer: &mut impl Observer<R>,
+    observer: impl FnMut(&Step<R>),
 ) -> Outcome<R> {
     let driver = model.foreign().unwrap_or_else(|| unreachable!("the model is built in"));
     let Constants { dt_s, criteria, frames, .. } = constants;

@@ -23,34 +23,18 @@ pub struct Step<R> {
     pub hazard: Hazard<R>,
 }
 
-/// Receives the steps of a lane. Sweeps use [`Silent`], which costs nothing.
-pub trait Observer<R> {
-    /// Called once per evaluated step.
-    fn step(&mut self, step: &Step<R>);
-}
+/// Ignores a step. All lanes that nobody observes have this observer: for each, all drivers are compiled.
+#[inline(always)]
+pub fn silent<R>(_: &Step<R>) {}
 
-/// Ignores every step.
-pub struct Silent;
-
-impl<R> Observer<R> for Silent {
-    #[inline(always)]
-    fn step(&mut self, _: &Step<R>) {}
-}
-
-impl<R, F: FnMut(&Step<R>)> Observer<R> for F {
-    fn step(&mut self, step: &Step<R>) {
-        self(step);
-    }
-}
-
-/// Runs one lane.
+/// Runs one lane; `observer` gets every step.
 #[inline(always)]
 pub(super) fn run_lane<R: Real, M: DriverModel<R>>(
     simulation: &Simulation<R, M>,
     case: &LaneCase<R>,
     tables: &Tables<R>,
     start: Start<R>,
-    observer: &mut impl Observer<R>,
+    mut observer: impl FnMut(&Step<R>),
 ) -> Outcome<R> {
     let lane = LaneConstants::new(simulation, case);
     let is_pair = simulation.scene.is_pair;
@@ -62,7 +46,7 @@ pub(super) fn run_lane<R: Real, M: DriverModel<R>>(
         let index = state.index;
         let v_ego = state.v_ego;
         let moved = advance(simulation, &lane, &state, &places);
-        observer.step(&Step { index, v_ego, seen: moved.seen, hazard: moved.hazard });
+        observer(&Step { index, v_ego, seen: moved.seen, hazard: moved.hazard });
         state = moved.state;
         if state.over.holds() || state.index >= simulation.frame.step_cap {
             return conclude(simulation, &lane, &state, &places);

@@ -16,7 +16,7 @@ use lanesweep_support::{Error, Place, Result, option};
 
 /// One other vehicle of a lane.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
 pub struct LaneOther<R> {
     /// Its motion.
     pub motion: Motion<R>,
@@ -41,7 +41,7 @@ pub struct LaneOther<R> {
 
 /// Data that all lanes of one case share.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
 pub struct LaneCase<R> {
     /// Principal vehicle, then the one ahead of it.
     pub others: [LaneOther<R>; 2],
@@ -71,11 +71,10 @@ impl LaneCase<f64> {
         if case.category == Category::CutOut && profile.frame.cut_out_evaluated == CutOutEvaluated::Ahead {
             others[0].judged = 0;
         }
-        let series = Series::of(&others[0].motion, tables, profile.step_cap());
         if exposed {
-            expose(case, profile, &series, &mut others, tables);
+            expose(case, profile, &mut others, tables);
         } else {
-            attend(case, profile, &series, &mut others);
+            attend(case, profile, &mut others, tables);
         }
         LaneCase {
             others,
@@ -147,43 +146,31 @@ fn encode_other(
         half_lengths: (case.ego_length_m + other.length_m) / 2.0,
         half_widths: (case.ego_width_m + other.width_m) / 2.0,
         gap_offset,
-        present_from: 0,
         present_until: NEVER,
-        attend_from: [0; MODELS],
         used: 1,
         judged: 1,
+        ..LaneOther::default()
     }
 }
 
-/// Series of the principal vehicle's motion, for the attention and exposure rules.
-struct Series {
-    lateral_m: Vec<f64>,
-    speed_mps: Vec<f64>,
-}
-
-impl Series {
-    /// Covers every event, because motions are constant after their last event.
-    fn of(motion: &Motion<f64>, tables: &Tables<f64>, step_cap: u32) -> Series {
-        let events = [motion.speed_len, motion.lateral_len, motion.speed_until, motion.lateral_until];
-        let steps = step_cap.min(events.into_iter().max().unwrap_or(0).saturating_add(2));
-        Series {
-            lateral_m: (0..steps).map(|i| motion.lateral(tables, i).position).collect(),
-            speed_mps: (0..steps).map(|i| motion.speed(tables, i)).collect(),
-        }
-    }
+/// Number of steps that cover every event of a motion, because motions are constant after their last event.
+fn steps_seen(motion: &Motion<f64>, step_cap: u32) -> u32 {
+    let events = [motion.speed_len, motion.lateral_len, motion.speed_until, motion.lateral_until];
+    step_cap.min(events.into_iter().max().unwrap_or(0).saturating_add(2))
 }
 
 /// Sets when each model may react.
-fn attend(case: &Case, profile: &Profile, series: &Series, others: &mut [LaneOther<f64>; 2]) {
+fn attend(case: &Case, profile: &Profile, others: &mut [LaneOther<f64>; 2], tables: &Tables<f64>) {
     let geometry = LaneGeometry {
         half_widths: others[0].half_widths,
         lane_width: case.lane_width_m,
         marking_gap: (case.lane_width_m - case.ego_width_m) * 0.5,
     };
-    let steps = series.lateral_m.len() as u32;
-    let lateral = |step: u32| series.lateral_m[step as usize];
-    let speed = |step: u32| series.speed_mps[step as usize];
+    let motion = others[0].motion;
+    let lateral = |step: u32| motion.lateral(tables, step).position;
+    let speed = |step: u32| motion.speed(tables, step);
     for (model, rule) in attention_rules(profile, case.category).into_iter().enumerate() {
+        let steps = steps_seen(&motion, profile.step_cap());
         let [principal, ahead] = rule.attend_from(steps, geometry, lateral, speed);
         others[0].attend_from[model] = principal;
         others[1].attend_from[model] = ahead;
@@ -203,16 +190,15 @@ lanesweep_model::for_every_driver_model!(declare_attention);
 
 /// The JRC's cut-out: no vehicle is present before the exposure, then the vehicle ahead. A cutting-out vehicle that
 /// hits it freezes there and takes its place.
-fn expose(case: &Case, profile: &Profile, series: &Series, others: &mut [LaneOther<f64>; 2], tables: &mut Tables<f64>) {
+fn expose(case: &Case, profile: &Profile, others: &mut [LaneOther<f64>; 2], tables: &mut Tables<f64>) {
     let Some(ahead) = &case.ahead else { return };
     let dt = profile.frame.dt_s;
     let cap = profile.step_cap();
-    let exposure = series.lateral_m.iter().position(|y| y.abs() > profile.frame.exposure_m);
-    let exposure = exposure.map_or(NEVER, |k| k as u32);
-
     let overlap_lengths = (case.principal.length_m + ahead.vehicle.length_m) / 2.0;
     let overlap_widths = (case.principal.width_m + ahead.vehicle.width_m) / 2.0;
     let (cutter, front) = (others[0].motion, others[1].motion);
+    let is_exposed = |&i: &u32| cutter.lateral(tables, i).position.abs() > profile.frame.exposure_m;
+    let exposure = (0..steps_seen(&cutter, cap)).find(is_exposed).unwrap_or(NEVER);
     let shift = if profile.frame.start_shift { front.speed(tables, 0) - cutter.speed(tables, 0) } else { 0.0 };
     let mut distance = ahead.gap_m + overlap_lengths + shift * dt;
     let mut freeze = NEVER;

@@ -122,7 +122,7 @@ impl<R: Real> Record<R> {
     /// Before the first step.
     #[inline(always)]
     pub(super) fn new() -> Self {
-        let (ttc, btn, measures) = (TtcMinimum::new(), BrakeThreatMaximum::new(), Measures::new());
+        let (ttc, btn, measures) = (TtcMinimum::start(), BrakeThreatMaximum::start(), Measures::start());
         Record { ttc, btn, min_gap: R::INFINITY, measures }
     }
 }
@@ -349,7 +349,7 @@ fn nearest_ttc<R: Real, M>(simulation: &Simulation<R, M>, first: &Seen<R>, secon
     let smaller = |ttc: TtcMinimum<R>, seen: &Seen<R>| {
         simulation.criteria.ttc.update(ttc, seen.judged, seen.view.gap, seen.view.closing(), true)
     };
-    let nearest = smaller(TtcMinimum::new(), first);
+    let nearest = smaller(TtcMinimum::start(), first);
     if simulation.scene.is_pair { smaller(nearest, second) } else { nearest }
 }
 

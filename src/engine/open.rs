@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::backend::Backend;
 use super::cpu::backend::CpuBackend;
-use super::device_choice::{BackendChoice, DeviceName};
+use super::device_choice::BackendChoice;
 use super::executor::Executor;
 use lanesweep_support::cancel::Cancel;
 use lanesweep_support::{Error, Result, option};
@@ -52,7 +52,7 @@ impl OpenBackend {
     /// # Errors
     /// [`Error::Usage`] for a device that does not exist or contradicts the backend. [`Error::Device`] if a GPU is
     /// required and none is available, or if its results differ from the CPU's.
-    pub fn open(choice: BackendChoice, device: Option<&DeviceName>) -> Result<OpenBackend> {
+    pub fn open(choice: BackendChoice, device: Option<&str>) -> Result<OpenBackend> {
         let cpu = || OpenBackend { executor: Executor::new(CpuBackend::lane_arithmetic()), device: None };
         if choice == BackendChoice::Cpu && device.is_none() {
             return Ok(cpu());
@@ -64,7 +64,7 @@ impl OpenBackend {
     ///
     /// # Errors
     /// As [`OpenBackend::open`]; [`Error::Device`] also if nothing was specified and there is no GPU.
-    pub fn open_to_verify(choice: BackendChoice, device: Option<&DeviceName>) -> Result<OpenBackend> {
+    pub fn open_to_verify(choice: BackendChoice, device: Option<&str>) -> Result<OpenBackend> {
         if choice == BackendChoice::Cpu && device.is_none() {
             return OpenBackend::open(choice, None);
         }
@@ -94,7 +94,7 @@ impl OpenBackend {
 
 /// Opens a device; `None` if the CPU is to compute.
 #[cfg(feature = "gpu")]
-fn open_device(choice: BackendChoice, device: Option<&DeviceName>, is_checked: bool) -> Result<Option<OpenBackend>> {
+fn open_device(choice: BackendChoice, device: Option<&str>, is_checked: bool) -> Result<Option<OpenBackend>> {
     use super::gpu::{Adapters, GpuBackend, GpuOptions, choose};
     let adapters = Adapters::enumerate();
     let Some(index) = choose(adapters.cards(), choice, device)? else { return Ok(None) };
@@ -141,7 +141,7 @@ fn nothing_to_verify() -> Error {
 }
 
 #[cfg(not(feature = "gpu"))]
-fn open_device(choice: BackendChoice, device: Option<&DeviceName>, _: bool) -> Result<Option<OpenBackend>> {
+fn open_device(choice: BackendChoice, device: Option<&str>, _: bool) -> Result<Option<OpenBackend>> {
     choice.check(device)?;
     match (choice, device) {
         (BackendChoice::Gpu, _) => Err(no_gpu(&option("backend = gpu"))),

@@ -28,7 +28,7 @@ impl Verdicts {
 }
 
 /// Why a lane ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 pub enum EndReason {
     /// The vehicles touched.
     Contact,
@@ -37,13 +37,14 @@ pub enum EndReason {
     /// The ego stands.
     Standstill,
     /// The time cap.
+    #[default]
     Cap,
     /// The JRC's rule for CCHDM: lateral overlap at a large TTC.
     Aborted,
 }
 
 /// Outcome of one lane in its own arithmetic; times are step indices.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
 pub struct Outcome<R> {
     /// Verdicts.
     pub verdicts: Verdicts,
@@ -80,29 +81,6 @@ pub struct Outcome<R> {
     /// Post-encroachment time of a cut-in, s, ≥ 0; infinite if the ego stops before the place of encroachment, `None` if
     /// there is none.
     pub pet: Option<R>,
-}
-
-impl Outcome<f64> {
-    /// Placeholder for a lane that has not been computed.
-    pub(super) const NONE: Self = Outcome {
-        verdicts: Verdicts(0),
-        contact: Contact::None,
-        contact_with: 0,
-        end: EndReason::Cap,
-        reaction_step: NO_STEP,
-        contact_step: NO_STEP,
-        end_step: 0,
-        impact_speed: 0.0,
-        impact_closing_speed: 0.0,
-        min_ttc: 0.0,
-        max_btn: 0.0,
-        min_gap: 0.0,
-        min_thw: 0.0,
-        max_drac: 0.0,
-        tet_steps: 0,
-        tit: 0.0,
-        pet: None,
-    };
 }
 
 impl<R: Real> Outcome<R> {

@@ -166,47 +166,27 @@ pub fn same_words(a: &Outcome<f64>, b: &Outcome<f64>) -> bool {
     words(a) == words(b)
 }
 
-/// An outcome as words, in the order of its fields; values as the bits of their exact widening.
-pub fn words(outcome: &Outcome<f64>) -> [u64; 17] {
-    // Destructures every field, so that a new field must be compared.
-    let &Outcome {
-        verdicts,
-        contact,
-        contact_with,
-        end,
-        reaction_step,
-        contact_step,
-        end_step,
-        impact_speed,
-        impact_closing_speed,
-        min_ttc,
-        max_btn,
-        min_gap,
-        min_thw,
-        max_drac,
-        tet_steps,
-        tit,
-        pet,
-    } = outcome;
+/// The fields of an outcome as words with their names, in order; values as the bits of their exact widening.
+pub fn words(o: &Outcome<f64>) -> [(&'static str, u64); 17] {
     [
-        verdicts.0.into(),
-        contact.code().into(),
-        contact_with.into(),
-        end as u64,
-        reaction_step.into(),
-        contact_step.into(),
-        end_step.into(),
-        impact_speed.to_bits(),
-        impact_closing_speed.to_bits(),
-        min_ttc.to_bits(),
-        max_btn.to_bits(),
-        min_gap.to_bits(),
-        min_thw.to_bits(),
-        max_drac.to_bits(),
-        tet_steps.into(),
-        tit.to_bits(),
+        ("verdicts", o.verdicts.0.into()),
+        ("contact", o.contact.code().into()),
+        ("contact_with", o.contact_with.into()),
+        ("end", o.end as u64),
+        ("reaction_step", o.reaction_step.into()),
+        ("contact_step", o.contact_step.into()),
+        ("end_step", o.end_step.into()),
+        ("impact_speed", o.impact_speed.to_bits()),
+        ("impact_closing_speed", o.impact_closing_speed.to_bits()),
+        ("min_ttc", o.min_ttc.to_bits()),
+        ("max_btn", o.max_btn.to_bits()),
+        ("min_gap", o.min_gap.to_bits()),
+        ("min_thw", o.min_thw.to_bits()),
+        ("max_drac", o.max_drac.to_bits()),
+        ("tet_steps", o.tet_steps.into()),
+        ("tit", o.tit.to_bits()),
         // No value has these bits.
-        pet.map_or(u64::MAX, f64::to_bits),
+        ("pet", o.pet.map_or(u64::MAX, f64::to_bits)),
     ]
 }
 
@@ -226,7 +206,7 @@ mod tests {
     use crate::cpu::series::Series;
     use crate::drivers::Constants;
     use crate::frame::Simulation;
-    use crate::lane::{Silent, run_lane};
+    use crate::lane::{run_lane, silent};
     use crate::scene::{Scene, fastest_in, may_cross};
     use crate::verify::{SetOptions, random_plan};
     use crate::{Backend, CpuBackend, Executor, LaneCase, Session, SweepSummary, Wanted};
@@ -342,7 +322,7 @@ mod tests {
             let (model_index, scene) = (self.id.index(), Scene::unknown(case.pair != 0));
             let simulation = Simulation { frame, criteria, model: &self.model, model_index, scene };
             let start = self.plan.headways[key.headway].start();
-            run_lane(&simulation, &case, &self.plan.tables().cast(), start, &mut Silent)
+            run_lane(&simulation, &case, &self.plan.tables().cast(), start, silent)
         }
 
         fn batched(&self, keys: &[LaneKey], each: &mut dyn FnMut(usize, Verdicts)) {

@@ -8,7 +8,7 @@ use super::lane_step::Seen;
 use super::outcome::{NO_STEP, Outcome};
 use super::plan::{Headway, LaneKey};
 use lanesweep_model::criterion::Contact;
-use lanesweep_model::driver::{ModelId, View};
+use lanesweep_model::driver::ModelId;
 use lanesweep_model::profile::Profile;
 use lanesweep_model::scalar::Real;
 use lanesweep_model::scenario::{Category, Tables};
@@ -134,7 +134,7 @@ impl Trace {
         let lane = Constants::<R>::resolve(profile, category);
         let dt_s = profile.frame.dt_s;
         let (mut steps, mut x_ego_m) = (Vec::new(), 0.0);
-        let mut each = |step: &Step<R>| {
+        let each = |step: &Step<R>| {
             let v_ego_mps = step.v_ego.to_f64();
             if step.index > 0 {
                 x_ego_m += v_ego_mps * dt_s;
@@ -152,7 +152,7 @@ impl Trace {
             });
         };
         let start = headway.start::<R>();
-        let outcome = lane.run(model, case, tables, start, &mut each).widen();
+        let outcome = lane.run(model, case, tables, start, each).widen();
         let gap = headway.start::<f64>().gap(case.ego_speed.to_f64());
         let nominal_gap_m = gap + case.others[0].gap_offset.to_f64();
         let shifted_gap_m = steps.first().filter(|_| profile.frame.start_shift).map(|first| first.others[0].gap_m);
@@ -244,35 +244,23 @@ impl<R: Real> LaneRunner<'_, R> {
     }
 }
 
+/// The measures are those of binary64, beside the lane.
 fn vehicle<R: Real>(measures: &Constants<f64>, seen: &Seen<R>, x_ego_m: f64) -> TracedVehicle {
-    let view = widened(&seen.view);
-    let (gap_m, closing) = (view.gap, view.closing());
+    let (view, of) = (&seen.view, R::to_f64);
+    let (v_ego, v_other, gap_m) = (of(view.v_ego), of(view.v_other), of(view.gap));
+    let closing = v_ego - v_other;
     TracedVehicle {
-        x_m: x_ego_m + gap_m + view.half_lengths,
-        y_m: seen.lateral.to_f64(),
-        v_mps: view.v_other,
+        x_m: x_ego_m + gap_m + of(view.half_lengths),
+        y_m: of(seen.lateral),
+        v_mps: v_other,
         gap_m,
-        lateral_gap_m: view.lateral_gap,
+        lateral_gap_m: of(view.lateral_gap),
         ttc_s: if closing > 0.0 { gap_m.max(0.0) / closing } else { f64::INFINITY },
         btn: measures.criteria.btn.at(gap_m, closing),
-        pfs: measures.fsm.pfs(view.v_ego, view.v_other, gap_m),
-        cfs: measures.fsm.cfs(view.v_ego, view.v_other, gap_m, view.a_ego),
+        pfs: measures.fsm.pfs(v_ego, v_other, gap_m),
+        cfs: measures.fsm.cfs(v_ego, v_other, gap_m, of(view.a_ego)),
         is_present: seen.present.holds(),
         is_judged: seen.judged.holds(),
-    }
-}
-
-/// The driver's view, exact, for measures that are computed beside the lane.
-fn widened<R: Real>(view: &View<R>) -> View<f64> {
-    View {
-        v_ego: view.v_ego.to_f64(),
-        a_ego: view.a_ego.to_f64(),
-        v_other: view.v_other.to_f64(),
-        gap: view.gap.to_f64(),
-        lateral_gap: view.lateral_gap.to_f64(),
-        lateral_towards: view.lateral_towards.to_f64(),
-        half_lengths: view.half_lengths.to_f64(),
-        marking_gap: view.marking_gap.to_f64(),
     }
 }
 

@@ -51,18 +51,12 @@ pub enum Lateral {
 }
 
 /// Series used by many lanes.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Default, Clone, PartialEq)]
 pub struct Tables<R> {
     /// Speeds, m/s, one per step.
     pub speed: Vec<R>,
     /// Lateral position, m, and speed towards the ego, m/s, one pair per step.
     pub lateral: Vec<[R; 2]>,
-}
-
-impl<R> Default for Tables<R> {
-    fn default() -> Self {
-        Tables { speed: Vec::new(), lateral: Vec::new() }
-    }
 }
 
 impl Tables<f64> {
@@ -80,9 +74,9 @@ pub const SPEED_SAMPLED: u32 = 1;
 /// [`Motion::kind`] bit: the lateral motion is a table.
 pub const LATERAL_SAMPLED: u32 = 2;
 
-/// The motion record that a lane decodes; 64 bytes in f32.
+/// The motion record that a lane decodes; 64 bytes in f32. The default is at rest in the middle of the ego's lane.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
 pub struct Motion<R> {
     /// Bits [`SPEED_SAMPLED`] and [`LATERAL_SAMPLED`].
     pub kind: u32,
@@ -158,33 +152,10 @@ impl<R: Real> Motion<R> {
     }
 }
 
-impl<R: Real> Motion<R> {
-    /// At rest in the middle of the ego's lane.
-    pub fn resting() -> Self {
-        Motion {
-            kind: 0,
-            speed_offset: 0,
-            speed_len: 0,
-            lateral_offset: 0,
-            lateral_len: 0,
-            speed_until: 0,
-            lateral_until: 0,
-            speed_initial: R::ZERO,
-            speed_per_step: R::ZERO,
-            speed_end: R::ZERO,
-            lateral_initial: R::ZERO,
-            lateral_per_step: R::ZERO,
-            lateral_end: R::ZERO,
-            lateral_towards: R::ZERO,
-            reserved: [0; 2],
-        }
-    }
-}
-
 impl Motion<f64> {
     /// Encodes a described motion at time step `dt_s`; sampled series go to the end of `tables`.
     pub fn encode(speed: &Speed, lateral: &Lateral, dt_s: f64, tables: &mut Tables<f64>) -> Self {
-        let mut motion = Motion::resting();
+        let mut motion = Motion::default();
         match speed {
             Speed::Kinematic { initial_mps, acceleration_mps2, until_s } => {
                 motion.speed_initial = initial_mps.max(0.0);

@@ -18,6 +18,7 @@ use std::ops::{Add, BitAnd, BitOr, Mul, Neg, Not, Sub};
 /// A scalar of the lane arithmetic. Models, criteria and the frame are written once over this trait.
 pub trait Real:
     Copy
+    + Default
     + PartialOrd
     + Debug
     + Send

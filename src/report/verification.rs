@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::lanes::outcome_record;
 use crate::records::record;
-use lanesweep_engine::verify::{Comparison, DifferingLane, GroupComparison, WORDS};
+use lanesweep_engine::verify::{Comparison, DifferingLane, GroupComparison};
 use lanesweep_engine::{Outcome, words};
 use lanesweep_model::criterion::Criterion;
 use lanesweep_support::readable::{count, value};
@@ -83,7 +83,8 @@ fn lane(lane: &DifferingLane) -> String {
         NumberText(format!("{}{mark}", shown[k][at]))
     };
     let names = ["CPU, f32", "under test"];
-    let rows = Table::of(0..WORDS.len()).column("word", |at| WORDS[at]).columns(0..2, |k| names[k].to_owned(), word);
+    let rows =
+        Table::of(0..all[0].len()).column("word", |at| all[0][at].0).columns(0..2, |k| names[k].to_owned(), word);
     format!("{}\n{}", lane.key, rows.build().text())
 }
 

@@ -6,7 +6,7 @@
 
 use lanesweep_engine::generated::{Generator, LateralPath, MAX_PARAMETERS, NO_SLOT, PointSource, Points, Recipe};
 use lanesweep_engine::shader::{self, Specialization};
-use lanesweep_engine::{Constants, Headway, Outcome, Silent};
+use lanesweep_engine::{Constants, Headway, Outcome, silent};
 use lanesweep_model::criterion::BtnForm;
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::profile::{CutOutTarget, Profile};
@@ -199,7 +199,7 @@ fn known(generator: &Generator, resolved: &Constants<f32>) -> Value {
         lanes.fold(FNV_BASIS, |hash, (case, start)| {
             let mut tables = Tables::default();
             let case = generator.case(case, &mut tables);
-            let outcome = resolved.run(model, &case, &tables, start.start(), &mut Silent);
+            let outcome = resolved.run(model, &case, &tables, start.start(), silent);
             words(&outcome).iter().fold(hash, |hash, word| (hash ^ word).wrapping_mul(FNV_PRIME))
         })
     };

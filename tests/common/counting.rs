@@ -59,7 +59,7 @@ fn compare(a: Counting, b: Counting) {
 }
 
 /// An f64 that counts what is done with it, per thread.
-#[derive(Debug, Clone, Copy)]
+#[derive(Default, Debug, Clone, Copy)]
 pub struct Counting(f64);
 
 impl Counting {

@@ -81,9 +81,9 @@ pub fn run_lane<R: Real>(
     model: ModelId,
     (case, tables): (&LaneCase<R>, &Tables<R>),
     start: Start<R>,
-    mut observer: &mut dyn FnMut(&Step<R>),
+    observer: &mut dyn FnMut(&Step<R>),
 ) -> Outcome<R> {
-    constants.run(model, case, tables, start, &mut observer)
+    constants.run(model, case, tables, start, observer)
 }
 
 /// Random lanes of each model and category.

@@ -61,10 +61,6 @@ pub struct StandardNormal {
 }
 
 impl Density for StandardNormal {
-    fn dimensions(&self) -> usize {
-        self.dimensions
-    }
-
     fn log_densities(&self, points: &[&[f64]]) -> Vec<f64> {
         let constant = self.dimensions as f64 * libm::log(2.0 * std::f64::consts::PI);
         points.iter().map(|point| -0.5 * (point.iter().map(|x| x * x).sum::<f64>() + constant)).collect()
@@ -76,8 +72,8 @@ impl Density for StandardNormal {
         words.take(self.dimensions).map(|word| normal_quantile((f64::from(word) + 0.5) / 2_f64.powi(32))).collect()
     }
 
-    fn mixture(&self) -> Option<Mixture> {
-        Some(unit_mixture(self.dimensions))
+    fn mixture(&self) -> Mixture {
+        unit_mixture(self.dimensions)
     }
 }
 
@@ -104,6 +100,6 @@ pub fn adaptive(
 ) -> Result<(Vec<Estimate>, SearchRun)> {
     let run = search(nominal, limit_state, options, seed)?;
     let draws = goal.draws(&run.questions, seed, level);
-    let estimates = importance(nominal, &run.proposal_or(nominal)?, limit_state, &draws, level)?;
+    let estimates = importance(nominal, &run.proposal_or(nominal), limit_state, &draws, level)?;
     Ok((estimates.into_iter().map(|estimate| estimate.after_search(run.points)).collect(), run))
 }

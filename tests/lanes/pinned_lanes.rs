@@ -33,7 +33,7 @@ const MEASURES: usize = 12;
 /// Adds the words of a lane.
 fn add(digests: &mut [Sha256; 2], outcome: &Outcome<f64>) {
     for (at, word) in words(outcome).into_iter().enumerate() {
-        digests[usize::from(at >= MEASURES)].update(word.to_le_bytes());
+        digests[usize::from(at >= MEASURES)].update(word.1.to_le_bytes());
     }
 }
 

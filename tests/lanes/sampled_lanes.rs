@@ -26,7 +26,7 @@ fn options(samples: u64) -> SampleOptions {
     SampleOptions { seed: 2026, ..SampleOptions::new(Estimator::Crude, samples, headways) }
 }
 
-fn outcomes(plan: &LanePlan, backend: &dyn Backend, cuts: &[u64]) -> Vec<[u64; 17]> {
+fn outcomes(plan: &LanePlan, backend: &dyn Backend, cuts: &[u64]) -> Vec<[(&'static str, u64); 17]> {
     let mut session = backend.prepare(plan).unwrap();
     let mut all = Vec::new();
     for ends in cuts.windows(2) {

@@ -13,7 +13,7 @@ use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::{Category, Scenario};
 
 /// Batches on every instruction set of this machine.
-fn in_batches() -> Vec<CpuBackend<f32>> {
+fn in_batches() -> Vec<CpuBackend> {
     let sets = Instructions::available().into_iter().filter(|set| *set != Instructions::Scalar);
     sets.map(|set| CpuBackend::with_instructions(set).unwrap()).collect()
 }
@@ -102,7 +102,7 @@ fn neither_threads_nor_calls_change_a_word() {
 }
 
 /// So many units at a time: outcomes and, asked for separately, verdicts.
-fn in_calls(plan: &LanePlan, backend: &CpuBackend<f32>, units: u64) -> (Vec<Outcome<f64>>, Vec<Verdicts>) {
+fn in_calls(plan: &LanePlan, backend: &CpuBackend, units: u64) -> (Vec<Outcome<f64>>, Vec<Verdicts>) {
     let mut session = backend.prepare(plan).unwrap();
     let (mut from, mut outcomes, mut verdicts) = (0, Vec::new(), Vec::new());
     while from < plan.unit_count() {

@@ -56,7 +56,7 @@ fn binomial_intervals_hold() {
             let points: Vec<Vec<f64>> = (0..samples).map(|index| density.attempt(&stream, index, 0)).collect();
             let values = linear(beta).evaluate(&points).expect("values");
             let failures = values.iter().filter(|value| **value <= 0.0).count() as u64;
-            let counts = Counts { runs: samples, failures, voids: 0, tries: samples };
+            let counts = Counts { runs: samples, failures, voids: 0 };
             from_counts(&counts, 0.95, StopReason::Samples)
         });
         missed.extend((!(0.93..=0.97).contains(&coverage)).then_some((name, coverage)));
@@ -81,7 +81,7 @@ fn binomial_intervals_hold_where_the_half_width_ends_the_sample() {
                 let next = if runs == 0 { 4096 } else { 2 * runs };
                 failures += (runs..next).filter(|_| random.next_u64() < limit).count() as u64;
                 runs = next;
-                let counts = Counts { runs, failures, voids: 0, tries: runs };
+                let counts = Counts { runs, failures, voids: 0 };
                 let estimate = from_counts(&counts, 0.95, StopReason::Samples);
                 if rule.at(runs, failures, estimate.relative_half_width, started).is_some() {
                     return estimate;
@@ -199,7 +199,7 @@ fn intervals_over_scenarios_hold() {
             let of = |seed: u64| {
                 let (runs, failures) = sampled_scenarios(n, population, seed);
                 let (all, failed) = (runs.iter().sum(), failures.iter().sum());
-                let counts = Counts { runs: all, failures: failed, voids: 0, tries: all };
+                let counts = Counts { runs: all, failures: failed, voids: 0 };
                 let draws = from_counts(&counts, 0.95, StopReason::Samples).interval;
                 let ours = cluster_rate(Clusters { runs: &runs, failures: &failures }, 0.95).interval;
                 let sum = |of: &[u64], drawn: &[usize]| drawn.iter().map(|at| of[*at]).sum::<u64>() as f64;

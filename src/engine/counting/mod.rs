@@ -5,6 +5,7 @@ mod kernel_counts;
 mod layout;
 mod sample_tally;
 
+pub(super) use kernel_counts::packed;
 pub use kernel_counts::{KernelCounts, cell_of};
 #[cfg(feature = "gpu")]
 pub(super) use layout::PackedLanes;

@@ -1,8 +1,8 @@
 //! The CPU backend: intervals of units are tasks of the rayon pool. f32 is the lane arithmetic that all backends share,
 //! in batches on the widest vector instructions of the machine; f64 is the reference, lane by lane.
 
-use std::marker::PhantomData;
 use std::ops::Range;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
@@ -46,23 +46,24 @@ fn lanes_of_steps(steps_per_thread: u64, step_cap: u32) -> u64 {
     (steps_per_thread.saturating_mul(threads) / u64::from(step_cap.max(1))).clamp(1, CHUNK_LANES)
 }
 
-/// Runs units on the rayon pool in the arithmetic `R`. Results depend neither on the threads nor on the instructions.
+/// Runs units on the rayon pool. Results depend neither on the threads nor on the instructions.
 #[derive(Debug)]
-pub struct CpuBackend<R> {
+pub struct CpuBackend {
     instructions: Instructions,
     every_step: bool,
-    arithmetic: PhantomData<R>,
+    /// In binary64.
+    is_reference: bool,
 }
 
-impl CpuBackend<f32> {
+impl CpuBackend {
     /// The lane arithmetic: binary32 with the fastest instructions of the machine.
     pub fn lane_arithmetic() -> Self {
-        CpuBackend { instructions: Instructions::best(), every_step: false, arithmetic: PhantomData }
+        CpuBackend { instructions: Instructions::best(), every_step: false, is_reference: false }
     }
 
     /// The lane arithmetic lane by lane: the reference for every other backend.
     pub fn scalar() -> Self {
-        CpuBackend { instructions: Instructions::Scalar, every_step: true, arithmetic: PhantomData }
+        CpuBackend { instructions: Instructions::Scalar, every_step: true, is_reference: false }
     }
 
     /// The lane arithmetic on the given instructions.
@@ -70,7 +71,7 @@ impl CpuBackend<f32> {
     /// # Errors
     /// [`Error::Usage`](lanesweep_support::Error::Usage) if this machine does not support them.
     pub fn with_instructions(instructions: Instructions) -> Result<Self> {
-        Ok(CpuBackend { instructions: instructions.checked()?, every_step: false, arithmetic: PhantomData })
+        Ok(CpuBackend { instructions: instructions.checked()?, every_step: false, is_reference: false })
     }
 
     /// Makes every step of every lane with all its vehicles, for benchmarks and tests. By default verdict-only batches
@@ -78,25 +79,14 @@ impl CpuBackend<f32> {
     pub fn every_step(self) -> Self {
         CpuBackend { every_step: true, ..self }
     }
-}
 
-impl CpuBackend<f64> {
     /// The reference: binary64, the same source code, lane by lane.
     pub fn reference() -> Self {
-        CpuBackend { instructions: Instructions::Scalar, every_step: true, arithmetic: PhantomData }
+        CpuBackend { is_reference: true, ..CpuBackend::scalar() }
     }
 }
 
-impl<R: Real> CpuBackend<R> {
-    fn description(&self) -> String {
-        let bits = 8 * std::mem::size_of::<R>();
-        let threads = rayon::current_num_threads();
-        let s = if threads == 1 { "" } else { "s" };
-        format!("CPU, {threads} thread{s}, {} binary{bits}", self.instructions)
-    }
-}
-
-impl Backend for CpuBackend<f32> {
+impl Backend for CpuBackend {
     /// Verdict-only batches skip steps.
     fn rechecked_by(&self, wanted: Wanted) -> RecheckBy {
         let makes_every_step = self.every_step || self.instructions == Instructions::Scalar;
@@ -107,98 +97,64 @@ impl Backend for CpuBackend<f32> {
     }
 
     fn describe(&self) -> String {
-        self.description()
+        let bits = if self.is_reference { 64 } else { 32 };
+        let threads = rayon::current_num_threads();
+        let s = if threads == 1 { "" } else { "s" };
+        format!("CPU, {threads} thread{s}, {} binary{bits}", self.instructions)
     }
 
     fn prepare<'p>(&self, plan: &'p LanePlan) -> Result<Box<dyn Session + 'p>> {
-        let (runner, instructions) = (LaneRunner::<f32>::new(plan).every_step(self.every_step), self.instructions);
-        if instructions == Instructions::Scalar {
-            return Ok(Box::new(lane_by_lane(plan, runner)));
+        if self.is_reference {
+            ModelId::refuse_foreign(&plan.models, "the reference in binary64")?;
+            return Ok(lane_by_lane(plan, LaneRunner::<f64>::new(plan)));
         }
-        let in_batches = runner.runs_in_batches(instructions);
-        let run = InBatches { runner, instructions };
-        Ok(Box::new(CpuSession { plan, run, in_batches, arithmetic: PhantomData }))
+        let (runner, instructions) = (LaneRunner::<f32>::new(plan).every_step(self.every_step), self.instructions);
+        if !runner.runs_in_batches(instructions) {
+            return Ok(lane_by_lane(plan, runner));
+        }
+        let runner = Arc::new(runner);
+        let same = runner.clone();
+        let verdicts: Run<'p, Verdicts> =
+            Box::new(move |block, units, each| same.run_units::<Verdicts>(instructions, block, units, each));
+        let outcomes: Run<'p, Outcome<f64>> = Box::new(move |block, units, each| {
+            runner.run_units(instructions, block, units, |at, outcome: Outcome<f32>| each(at, outcome.widen()));
+        });
+        Ok(Box::new(CpuSession { plan, in_batches: true, verdicts, outcomes }))
     }
 }
 
-impl Backend for CpuBackend<f64> {
-    fn rechecked_by(&self, _wanted: Wanted) -> RecheckBy {
-        RecheckBy::Nothing
-    }
-
-    fn describe(&self) -> String {
-        self.description()
-    }
-
-    fn prepare<'p>(&self, plan: &'p LanePlan) -> Result<Box<dyn Session + 'p>> {
-        ModelId::refuse_foreign(&plan.models, "the reference in binary64")?;
-        Ok(Box::new(lane_by_lane(plan, LaneRunner::<f64>::new(plan))))
-    }
-}
+/// Runs the lanes of some units of a block; passes each result with its position, counted from the first unit.
+type Run<'p, E> = Box<dyn Fn(usize, Range<u64>, &mut dyn FnMut(usize, E)) + Send + Sync + 'p>;
 
 /// A session that runs single lanes.
-fn lane_by_lane<'p, R: Real>(plan: &'p LanePlan, runner: LaneRunner<'p, R>) -> CpuSession<'p, LaneRunner<'p, R>, R> {
-    CpuSession { plan, run: runner, in_batches: false, arithmetic: PhantomData }
+fn lane_by_lane<'p, R: Real>(plan: &'p LanePlan, runner: LaneRunner<'p, R>) -> Box<dyn Session + 'p> {
+    let runner = Arc::new(runner);
+    let run =
+        |runner: &LaneRunner<'p, R>, block, units: Range<u64>, measures, each: &mut dyn FnMut(usize, Outcome<R>)| {
+            let per_unit = plan.lanes_per_unit(&plan.blocks[block]) as usize;
+            for (k, unit) in units.enumerate() {
+                runner.run_unit(block, unit, measures, |at, outcome| each(k * per_unit + at, outcome));
+            }
+        };
+    let same = runner.clone();
+    let verdicts: Run<'p, Verdicts> = Box::new(move |block, units, each| {
+        run(&same, block, units, false, &mut |at, outcome| each(at, outcome.verdicts));
+    });
+    let outcomes: Run<'p, Outcome<f64>> = Box::new(move |block, units, each| {
+        run(&runner, block, units, true, &mut |at, outcome| each(at, outcome.widen()));
+    });
+    Box::new(CpuSession { plan, in_batches: false, verdicts, outcomes })
 }
 
-/// Runs the lanes of some units of a block.
-trait RunUnits<R>: Sync {
-    /// Passes each outcome with its position, counted from the first unit.
-    fn outcomes(&self, block: usize, units: Range<u64>, each: &mut dyn FnMut(usize, Outcome<R>));
-
-    /// Verdicts only.
-    fn verdicts(&self, block: usize, units: Range<u64>, verdicts: &mut [Verdicts]);
-}
-
-/// Lanes in batches.
-struct InBatches<'p> {
-    runner: LaneRunner<'p, f32>,
-    instructions: Instructions,
-}
-
-impl RunUnits<f32> for InBatches<'_> {
-    fn outcomes(&self, block: usize, units: Range<u64>, each: &mut dyn FnMut(usize, Outcome<f32>)) {
-        self.runner.run_units(self.instructions, block, units, each);
-    }
-
-    fn verdicts(&self, block: usize, units: Range<u64>, verdicts: &mut [Verdicts]) {
-        self.runner.run_units(self.instructions, block, units, |at, verdict| verdicts[at] = verdict);
-    }
-}
-
-/// Scalar lanes.
-impl<R: Real> RunUnits<R> for LaneRunner<'_, R> {
-    fn outcomes(&self, block: usize, units: Range<u64>, each: &mut dyn FnMut(usize, Outcome<R>)) {
-        run_one_by_one(self, block, units, true, each);
-    }
-
-    fn verdicts(&self, block: usize, units: Range<u64>, verdicts: &mut [Verdicts]) {
-        run_one_by_one(self, block, units, false, |at, outcome| verdicts[at] = outcome.verdicts);
-    }
-}
-
-fn run_one_by_one<R: Real>(
-    runner: &LaneRunner<'_, R>,
-    block: usize,
-    units: Range<u64>,
-    keeps_measures: bool,
-    mut each: impl FnMut(usize, Outcome<R>),
-) {
-    let per_unit = runner.plan().lanes_per_unit(&runner.plan().blocks[block]) as usize;
-    for (k, unit) in units.enumerate() {
-        runner.run_unit(block, unit, keeps_measures, |at, outcome| each(k * per_unit + at, outcome));
-    }
-}
-
-struct CpuSession<'p, F, R> {
+struct CpuSession<'p> {
     plan: &'p LanePlan,
-    run: F,
     /// Batches need tasks with many lanes.
     in_batches: bool,
-    arithmetic: PhantomData<fn(R)>,
+    verdicts: Run<'p, Verdicts>,
+    outcomes: Run<'p, Outcome<f64>>,
 }
 
-impl<F: RunUnits<R>, R: Real> CpuSession<'_, F, R> {
+impl CpuSession<'_> {
     /// Units per task: enough lanes to fill batches, and if possible several tasks per thread.
     fn task_units(&self, block: usize, units: u64) -> u64 {
         if !self.in_batches {
@@ -214,28 +170,18 @@ impl<F: RunUnits<R>, R: Real> CpuSession<'_, F, R> {
         let min_units = SMALL_TASK.div_ceil(per_unit_and_model).min(max_units);
         units.div_ceil(TASKS_PER_THREAD * threads).clamp(min_units, max_units).min(units.div_ceil(threads)).max(1)
     }
-
-    fn has_foreign(&self) -> bool {
-        self.plan.models.iter().any(|model| model.foreign().is_some())
-    }
-
-    /// Units of a task, counted within the block.
-    fn task(inside: &Range<u64>, task_units: u64, k: usize) -> Range<u64> {
-        let from = inside.start + k as u64 * task_units;
-        from..inside.end.min(from + task_units)
-    }
 }
 
-impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
+impl Session for CpuSession<'_> {
     fn chunk_lanes(&self, _wanted: Wanted) -> u64 {
         let steps = if self.in_batches { CHUNK_STEPS } else { CHUNK_STEPS_OF_SINGLE_LANES };
         let lanes = lanes_of_steps(steps, self.plan.profile.step_cap());
-        if self.has_foreign() { lanes.min(BATCH_LANES * self.plan.models.len() as u64) } else { lanes }
+        let has_foreign = self.plan.models.iter().any(|model| model.foreign().is_some());
+        if has_foreign { lanes.min(BATCH_LANES * self.plan.models.len() as u64) } else { lanes }
     }
 
     fn run(&mut self, units: Range<u64>, wanted: Wanted) -> Result<Chunk> {
         let plan = self.plan;
-        let run = &self.run;
         let first_lane = plan.first_lane_of(units.start);
         let mut verdicts = Vec::new();
         let mut outcomes = Vec::new();
@@ -243,23 +189,27 @@ impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
             let per_unit = plan.lanes_per_unit(&plan.blocks[block]) as usize;
             let count = (inside.end - inside.start) as usize;
             let task_units = self.task_units(block, count as u64);
-            let task = |k: usize| Self::task(&inside, task_units, k);
+            let task = |k: usize| {
+                let from = inside.start + k as u64 * task_units;
+                from..inside.end.min(from + task_units)
+            };
             let task_lanes = task_units as usize * per_unit;
             let from = verdicts.len();
             verdicts.resize(from + count * per_unit, Verdicts::default());
             match wanted {
                 Wanted::Verdicts | Wanted::Counts => {
                     let tasks = verdicts[from..].par_chunks_mut(task_lanes).enumerate();
-                    tasks.for_each(|(k, lanes)| run.verdicts(block, task(k), lanes));
+                    tasks.for_each(|(k, lanes)| {
+                        (self.verdicts)(block, task(k), &mut |at, verdicts| lanes[at] = verdicts)
+                    });
                 }
                 Wanted::Outcomes => {
-                    outcomes.resize(from + count * per_unit, Outcome::NONE);
+                    outcomes.resize(from + count * per_unit, Outcome::default());
                     let tasks =
                         outcomes[from..].par_chunks_mut(task_lanes).zip(verdicts[from..].par_chunks_mut(task_lanes));
                     tasks.enumerate().for_each(|(k, (lanes, verdicts))| {
-                        run.outcomes(block, task(k), &mut |at, outcome| {
-                            lanes[at] = outcome.widen();
-                            verdicts[at] = outcome.verdicts;
+                        (self.outcomes)(block, task(k), &mut |at, outcome| {
+                            (lanes[at], verdicts[at]) = (outcome, outcome.verdicts);
                         });
                     });
                 }

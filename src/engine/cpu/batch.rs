@@ -61,7 +61,7 @@ impl<'c> Fleet<'c> {
     /// All slots are free. `vehicles` are the other vehicles that the batches evaluate.
     pub(super) fn new(stream: &Lanes<'_>, entries: &'c [f32], vehicles: [usize; 2]) -> Self {
         let window = |vehicle: usize, quantity: usize| {
-            Window::new(stream.tracks.iter().map(|tracks| tracks[vehicle].all()[quantity]), entries)
+            Window::new(stream.tracks.iter().map(|tracks| tracks[vehicle][quantity]), entries)
         };
         let windows = vehicles.map(|vehicle| [0, 1, 2].map(|quantity| window(vehicle, quantity)));
         let lanes = LaneArrays::idle();

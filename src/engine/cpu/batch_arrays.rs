@@ -36,24 +36,8 @@ pub(crate) struct Track {
     pub last: u32,
 }
 
-/// Series of another vehicle's motion.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct VehicleTracks {
-    /// Speed, m/s.
-    pub speed: Track,
-    /// Lateral position, m.
-    pub position: Track,
-    /// Lateral speed towards the ego, m/s.
-    pub towards: Track,
-}
-
-impl VehicleTracks {
-    /// Speed, lateral position, lateral speed.
-    #[inline(always)]
-    pub(super) fn all(&self) -> [Track; 3] {
-        [self.speed, self.position, self.towards]
-    }
-}
+/// Series of another vehicle's speed, m/s, lateral position, m, and lateral speed towards the ego, m/s.
+pub(crate) type VehicleTracks = [Track; 3];
 
 /// All data of `N` lanes except the other vehicles' motions, which are in series.
 #[derive(Debug, Clone, Copy)]
@@ -218,65 +202,15 @@ impl<const N: usize> LaneArrays<N> {
         [ego.rows_mut(), principal.rows_mut(), second, moving.rows_mut(), ahead, gathered, measured]
     }
 
-    /// Writes one case into [`LANES`] lanes. Only the gaps in `state` may differ between them; [`LaneArrays::start`]
-    /// sets these.
+    /// Writes one lane into [`LANES`] lanes of its case. Only their gaps and indices differ; [`LaneArrays::start`] sets these.
     #[inline(always)]
-    pub(super) fn fill(
-        &mut self,
-        from: usize,
-        constants: &LaneConstants<f32>,
-        tracks: &[VehicleTracks],
-        state: &LaneState<f32>,
-        leaves_from: u32,
-        values: bool,
-    ) {
-        for ((other, constants), tracks) in self.fixed.others.iter_mut().zip(&constants.others).zip(tracks) {
-            fill(&mut other.half_lengths, from, constants.half_lengths);
-            fill(&mut other.half_widths, from, constants.half_widths);
-            fill(&mut other.present_from, from, constants.present_from);
-            fill(&mut other.present_until, from, constants.present_until);
-            fill(&mut other.attend_from, from, constants.attend_from);
-            fill(&mut other.judged, from, constants.judged.to_bits());
-            for (rows, Track { first, last }) in other.tracks.iter_mut().zip(tracks.all()) {
-                fill(&mut rows.first, from, first);
-                fill(&mut rows.last, from, last);
+    pub(super) fn fill(&mut self, from: usize, lane: &LaneArrays<1>, is_pair: bool, values: bool) {
+        for (part, words) in
+            self.parts_mut(is_pair, values, values).into_iter().zip(lane.parts(is_pair, values, values))
+        {
+            for (row, [word]) in part.iter_mut().zip(words) {
+                row[from..from + LANES].fill(*word);
             }
-        }
-        fill(&mut self.fixed.ego.width, from, constants.ego_width);
-        fill(&mut self.fixed.ego.marking_gap, from, constants.marking_gap);
-        fill(&mut self.fixed.ego.horizon, from, constants.horizon);
-        let steady_from = steady_from(tracks);
-        fill(&mut self.fixed.ego.eventful_until, from, steady_from);
-        fill(&mut self.fixed.ego.still_from, from, steady_from);
-        fill(&mut self.fixed.ego.leaves_from, from, leaves_from);
-        let moving = &mut self.state.moving;
-        fill(&mut moving.index, from, state.index);
-        fill(&mut moving.v_ego, from, state.v_ego);
-        fill(&mut moving.v_before, from, state.v_before);
-        fill(&mut moving.deceleration, from, state.driver.deceleration);
-        fill(&mut moving.delay_steps, from, state.driver.delay_steps);
-        fill(&mut moving.ttc_failed, from, state.record.ttc.failed.to_bits());
-        fill(&mut moving.btn_failed, from, state.record.btn.failed.to_bits());
-        fill(&mut moving.over, from, state.over.to_bits());
-        if values {
-            let values = &mut self.state.values;
-            fill(&mut values.reaction_step, from, state.reaction_step);
-            fill(&mut values.ttc_gap, from, state.record.ttc.gap);
-            fill(&mut values.ttc_closing, from, state.record.ttc.closing);
-            fill(&mut values.btn_numerator, from, state.record.btn.numerator);
-            fill(&mut values.btn_denominator, from, state.record.btn.denominator);
-            fill(&mut values.min_gap, from, state.record.min_gap);
-            let (rows, measures) = (&mut self.state.measures, state.record.measures);
-            fill(&mut rows.thw_gap, from, measures.thw_gap);
-            fill(&mut rows.thw_speed, from, measures.thw_speed);
-            fill(&mut rows.drac_numerator, from, measures.drac_numerator);
-            fill(&mut rows.drac_denominator, from, measures.drac_denominator);
-            fill(&mut rows.tet_steps, from, measures.tet_steps);
-            fill(&mut rows.tit_sum, from, measures.tit_sum);
-            fill(&mut rows.pet_begun, from, measures.pet_begun.to_bits());
-            fill(&mut rows.pet_distance, from, measures.pet_distance);
-            fill(&mut rows.pet_speed, from, measures.pet_speed);
-            fill(&mut rows.pet_steps, from, measures.pet_steps);
         }
     }
 
@@ -326,6 +260,44 @@ impl<const N: usize> LaneArrays<N> {
     }
 }
 
+impl LaneArrays<1> {
+    /// A lane before its first step.
+    #[inline(always)]
+    pub(super) fn of<M: DriverModel<f32>>(
+        constants: &LaneConstants<f32>,
+        tracks: &[VehicleTracks; 2],
+        state: &LaneState<f32>,
+        leaves_from: u32,
+    ) -> Self {
+        let other = |vehicle: usize| {
+            let of = &constants.others[vehicle];
+            OtherArrays {
+                half_lengths: [of.half_lengths],
+                half_widths: [of.half_widths],
+                present_from: [of.present_from],
+                present_until: [of.present_until],
+                attend_from: [of.attend_from],
+                judged: [of.judged.to_bits()],
+                tracks: tracks[vehicle].map(|Track { first, last }| TrackArrays { first: [first], last: [last] }),
+            }
+        };
+        let steady_from = [steady_from(tracks)];
+        let ego = EgoArrays {
+            lane: [0],
+            width: [constants.ego_width],
+            marking_gap: [constants.marking_gap],
+            horizon: [constants.horizon],
+            eventful_until: steady_from,
+            still_from: steady_from,
+            leaves_from: [leaves_from],
+        };
+        let mut lane = LaneArrays { fixed: FixedArrays { ego, others: [other(0), other(1)] }, ..LaneArrays::idle() };
+        // A set that keeps everything.
+        lane.state.set::<M>(0, state, Rules::ALL[1]);
+        lane
+    }
+}
+
 impl<const N: usize> FixedArrays<N> {
     /// The constants of a lane.
     #[inline(always)]
@@ -352,7 +324,7 @@ impl<const N: usize> FixedArrays<N> {
 
 /// The step from which on these vehicles keep speed and lateral position.
 pub(crate) fn steady_from(tracks: &[VehicleTracks]) -> u32 {
-    tracks.iter().flat_map(VehicleTracks::all).map(|track| track.last).max().unwrap_or(0)
+    tracks.iter().flatten().map(|track| track.last).max().unwrap_or(0)
 }
 
 impl<const N: usize> StateArrays<N> {
@@ -490,12 +462,6 @@ fn copy<const N: usize, const M: usize>(rows: &mut [[u32; N]], to: usize, from: 
     }
 }
 
-/// Writes a value for [`LANES`] lanes, starting at `from`.
-#[inline(always)]
-fn fill<T: Copy, const N: usize>(row: &mut [T; N], from: usize, value: T) {
-    row[from..from + LANES].fill(value);
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -524,7 +490,7 @@ mod tests {
         };
         let constants = LaneConstants { others: [other; 2], ego_width: 6.0, marking_gap: 8.0, horizon: 7 };
         let track = Track { first: 8, last: 9 };
-        let tracks = [VehicleTracks { speed: track, position: track, towards: track }; 2];
+        let tracks = [[track; 3]; 2];
         let record = Record {
             ttc: TtcMinimum { gap: 10.0, closing: 11.0, failed: Flag::TRUE },
             btn: BrakeThreatMaximum { numerator: 12.0, denominator: 13.0, failed: Flag::TRUE },
@@ -553,7 +519,7 @@ mod tests {
             over: Flag::TRUE,
         };
         let mut lanes = LaneArrays::<32>::idle();
-        lanes.fill(16, &constants, &tracks, &state, 24, true);
+        lanes.fill(16, &LaneArrays::of::<Fsm<f32>>(&constants, &tracks, &state, 24), true, true);
         lanes.start(31, 23, state.gaps);
         assert!(lanes.parts(true, true, true).into_iter().flatten().all(|row| row[31] != 0), "{lanes:?}");
         assert_eq!(lanes.state.at(31), state);
@@ -561,10 +527,9 @@ mod tests {
         // A lane that continues with the second vehicle has it first, with its gap.
         let mut batch = LaneArrays::<LANES>::idle();
         let second = Track { first: 31, last: 32 };
-        let second = VehicleTracks { speed: second, position: second, towards: second };
         let ahead = OtherConstants { half_lengths: 33.0, attend_from: 34, ..other };
         let pair = LaneConstants { others: [other, ahead], ..constants };
-        batch.fill(0, &pair, &[tracks[0], second], &state, 24, false);
+        batch.fill(0, &LaneArrays::of::<Fsm<f32>>(&pair, &[tracks[0], [second; 3]], &state, 24), true, false);
         batch.start(5, 23, state.gaps);
         let mut pending = LaneArrays::<32>::idle();
         pending.set_single(31, &batch, 5, 1, NEVER_LEAVES);

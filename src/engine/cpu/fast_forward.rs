@@ -322,8 +322,8 @@ mod tests {
             driver: DriverState { deceleration: 0.0, delay_steps: between(0.0, 5.0) as u32 },
             reaction_step: 0,
             record: Record {
-                ttc: TtcMinimum { failed: Flag::of(between(0.0, 1.0) < 0.3), ..TtcMinimum::new() },
-                btn: BrakeThreatMaximum { failed: Flag::of(between(0.0, 1.0) < 0.3), ..BrakeThreatMaximum::new() },
+                ttc: TtcMinimum { failed: Flag::of(between(0.0, 1.0) < 0.3), ..TtcMinimum::start() },
+                btn: BrakeThreatMaximum { failed: Flag::of(between(0.0, 1.0) < 0.3), ..BrakeThreatMaximum::start() },
                 ..Record::new()
             },
             over: Flag::FALSE,

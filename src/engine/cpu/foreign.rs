@@ -5,7 +5,7 @@ use crate::cpu::batch_arrays::VehicleTracks;
 use crate::cpu::lane_result::conclude;
 use crate::cpu::side_by_side::SideBySide;
 use crate::frame::{Frame, Simulation, Start};
-use crate::lane::{Observer, Step};
+use crate::lane::Step;
 use crate::lane_case::LaneCase;
 use crate::lane_step::{LaneConstants, LaneState, OtherState, advance};
 use crate::outcome::{NO_STEP, Outcome};
@@ -83,7 +83,7 @@ pub(crate) fn run_one<R: Real>(
     case: &LaneCase<R>,
     tables: &Tables<R>,
     start: Start<R>,
-    observer: &mut impl Observer<R>,
+    mut observer: impl FnMut(&Step<R>),
 ) -> Result<Outcome<R>> {
     let Setting { driver, dt_s, frame, .. } = *setting;
     let simulation = setting.simulation(case.pair != 0);
@@ -97,7 +97,7 @@ pub(crate) fn run_one<R: Real>(
         let first = OtherState::of(&case.others[0].motion, tables, index);
         let second = if case.pair != 0 { OtherState::of(&case.others[1].motion, tables, index) } else { first };
         let moved = advance(&simulation, &constants, &state, &[first, second]);
-        observer.step(&Step { index, v_ego, seen: moved.seen, hazard: moved.hazard });
+        observer(&Step { index, v_ego, seen: moved.seen, hazard: moved.hazard });
         columns.step = index;
         columns.rows = vec![0.0; row::COUNT];
         // Exact in the lane arithmetic.
@@ -144,7 +144,7 @@ pub(crate) fn run_lanes(
     let simulation = &setting.simulation(cases.iter().any(|case| case.pair != 0));
     let mut lanes = SideBySide::new(simulation, cases.iter().zip(tracks), entries, starts);
     // Every lane gets its outcome below.
-    let mut outcomes = vec![Outcome::NONE; lanes.count()];
+    let mut outcomes = vec![Outcome::default(); lanes.count()];
     let mut accelerations = setting.driver.start(lanes.count(), setting.dt_s)?;
     lanes.columns.dt_s = setting.dt_s;
     lanes.columns.state = vec![0.0; setting.driver.state_rows() * lanes.columns.stride];

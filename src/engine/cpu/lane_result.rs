@@ -10,7 +10,7 @@ use crate::lane_step::{
 use crate::outcome::{EndReason, NO_STEP, Outcome, Verdicts};
 
 /// The result that a sweep returns per lane: an outcome or only verdicts.
-pub(crate) trait Ending: From<Outcome<f32>> {
+pub(crate) trait Ending {
     /// The result has minima and maxima, which the steps must accumulate.
     const HAS_VALUES: bool;
 
@@ -21,12 +21,6 @@ pub(crate) trait Ending: From<Outcome<f32>> {
         state: &LaneState<f32>,
         places: &[OtherState<f32>; 2],
     ) -> Self;
-}
-
-impl From<Outcome<f32>> for Verdicts {
-    fn from(outcome: Outcome<f32>) -> Self {
-        outcome.verdicts
-    }
 }
 
 impl Ending for Verdicts {

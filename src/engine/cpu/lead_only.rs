@@ -25,7 +25,7 @@ pub(crate) fn lead_only_from<M: DriverModel<f32>>(
     if second.present_until < Flag::LATEST_STEP || !second.judged.holds() {
         return NEVER_LEAVES;
     }
-    let VehicleTracks { position, towards, .. } = tracks[0];
+    let [_, position, towards] = tracks[0];
     // Up to `count` entries from a step on; the last entry is repeated.
     let at = |track: Track, step: u32, count: usize| {
         let from = (track.first + step.min(track.last)) as usize;

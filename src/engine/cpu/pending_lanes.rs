@@ -162,16 +162,16 @@ impl Pending {
         let constants = LaneConstants::new(simulation, case);
         let leaves_from = match sets_apart {
             Some(entries) => lead_only_from(simulation, &constants, tracks, entries),
-            None if self.asks_steady => steady_from(&tracks[..1]) + 1,
+            None if self.asks_steady => steady_from(tracks) + 1,
             None => NEVER_LEAVES,
         };
-        let tracks = &tracks[..if simulation.scene.is_pair { 2 } else { 1 }];
         let all = stream.starts_of(self.case);
         let starts = &all[self.start..];
         let starts = &starts[..starts.len().min(MAX_PENDING - self.end)];
         for starts in starts.chunks(LANES) {
             let state = LaneState::new(simulation, case, starts[0]);
-            self.lanes.fill(self.end, &constants, tracks, &state, leaves_from, self.values);
+            let lane = LaneArrays::of::<M>(&constants, tracks, &state, leaves_from);
+            self.lanes.fill(self.end, &lane, simulation.scene.is_pair, self.values);
             for &start in starts {
                 self.lanes.start(self.end, self.lane, LaneState::new(simulation, case, start).gaps);
                 self.end += 1;

@@ -13,7 +13,7 @@ use crate::cpu::series::{Series, max_entries};
 use crate::cpu::simd::Instructions;
 use crate::drivers::Constants;
 use crate::frame::Start;
-use crate::lane::Silent;
+use crate::lane::silent;
 use crate::lane_case::LaneCase;
 use crate::outcome::{Outcome, Verdicts};
 use crate::plan::{LaneKey, LanePlan};
@@ -84,17 +84,8 @@ impl<'p, R: Real> LaneRunner<'p, R> {
     /// Runs one lane without stream rules.
     pub fn run(&self, key: &LaneKey) -> Outcome<R> {
         let (case, tables) = self.case(key.block, key.unit, key.variant);
-        let scene = Scene::unknown(case.pair != 0);
-        let constants = &self.constants[key.block];
-        constants.run_in(
-            self.plan.models[key.model],
-            &constants.criteria,
-            scene,
-            &case,
-            &tables,
-            self.starts[key.headway],
-            &mut Silent,
-        )
+        let (model, start) = (self.plan.models[key.model], self.starts[key.headway]);
+        self.constants[key.block].run(model, &case, &tables, start, silent)
     }
 
     fn dt(&self) -> R {
@@ -133,39 +124,26 @@ impl<'p, R: Real> LaneRunner<'p, R> {
         keeps_measures: bool,
         mut each: impl FnMut(usize, Outcome<R>),
     ) {
-        let criteria = Criteria { keeps_measures, ..self.constants[block].criteria };
+        let constants = &self.constants[block];
+        let criteria = &Criteria { keeps_measures, ..constants.criteria };
         let mut at = 0;
         for variant in 0..self.plan.blocks[block].variants.len() {
             let (case, tables) = self.case(block, unit, variant);
             let may_cross = may_cross(&case, fastest_in(&tables), self.dt());
             for &start in &self.starts {
                 for &model in &self.plan.models {
+                    let scene = if self.as_in_batches {
+                        Scene::of(std::slice::from_ref(&case), model.index(), may_cross)
+                    } else {
+                        Scene { may_cross, ..Scene::unknown(case.pair != 0) }
+                    };
                     if model.foreign().is_none() {
-                        each(at, self.run_case(block, &criteria, &case, &tables, may_cross, start, model));
+                        each(at, constants.run_in(model, criteria, scene, &case, &tables, start, silent));
                     }
                     at += 1;
                 }
             }
         }
-    }
-
-    #[expect(clippy::too_many_arguments, reason = "a lane has as many properties")]
-    fn run_case(
-        &self,
-        block: usize,
-        criteria: &Criteria<R>,
-        case: &LaneCase<R>,
-        tables: &Tables<R>,
-        may_cross: bool,
-        start: Start<R>,
-        model: ModelId,
-    ) -> Outcome<R> {
-        let scene = if self.as_in_batches {
-            Scene::of(std::slice::from_ref(case), model.index(), may_cross)
-        } else {
-            Scene { may_cross, ..Scene::unknown(case.pair != 0) }
-        };
-        self.constants[block].run_in(model, criteria, scene, case, tables, start, &mut Silent)
     }
 }
 
@@ -215,7 +193,7 @@ impl LaneRunner<'_, f32> {
 }
 
 impl LaneRunner<'_, f32> {
-    /// Runs all lanes of some units of a block in batches, except those of drivers outside the registry; passes the position, counted from the first unit, and the
+    /// Runs all lanes of some units of a block in batches if they [run so](LaneRunner::runs_in_batches), except those of drivers outside the registry; passes the position, counted from the first unit, and the
     /// result. The order is unspecified.
     pub(super) fn run_units<E: Ending>(
         &self,
@@ -235,23 +213,17 @@ impl LaneRunner<'_, f32> {
             }
         };
         let constants = &self.constants[block];
-        let in_batches = constants.run_in_batches(instructions);
         let step_cap = self.plan.profile.step_cap();
         let mut series = self.spare.lock().ok().and_then(|mut spare| spare.pop()).unwrap_or_default();
         series.clear();
-        let unrolled = if in_batches { &cases[..] } else { &[] };
-        let tracks: Vec<_> = unrolled.iter().map(|case| series.unroll(case, tables, step_cap)).collect();
-        let may_cross = unrolled.iter().any(|case| may_cross(case, fastest_in(tables), self.dt()));
+        let tracks: Vec<_> = cases.iter().map(|case| series.unroll(case, tables, step_cap)).collect();
+        let may_cross = cases.iter().any(|case| may_cross(case, fastest_in(tables), self.dt()));
         let (starts, every_step) = (&self.starts[..], self.every_step);
         let stream = Lanes { cases: &cases, tracks: &tracks, starts, one_start_each: false, every_step, may_cross };
         let models = self.plan.models.len();
         for (at_model, &model) in self.plan.models.iter().enumerate().filter(|(_, model)| model.foreign().is_none()) {
             let each = |lane: usize, end: E| each(lane * models + at_model, end);
-            if in_batches {
-                constants.run_stream(model, instructions, &stream, series.entries(), each);
-            } else {
-                self.one_by_one(block, &cases, tables, model, each);
-            }
+            constants.run_stream(model, instructions, &stream, series.entries(), each);
         }
         if let Ok(mut spare) = self.spare.lock() {
             spare.push(series);
@@ -281,24 +253,5 @@ impl LaneRunner<'_, f32> {
         let (cases, tracks, starts) = (&cases[..], &tracks[..], &starts[..]);
         let stream = Lanes { cases, tracks, starts, one_start_each: true, every_step: true, may_cross };
         constants.run_stream(self.plan.models[model], instructions, &stream, series.entries(), each);
-    }
-
-    /// Runs all lanes of a model one by one.
-    fn one_by_one<E: Ending>(
-        &self,
-        block: usize,
-        cases: &[LaneCase<f32>],
-        tables: &Tables<f32>,
-        model: ModelId,
-        mut each: impl FnMut(usize, E),
-    ) {
-        let criteria = &Criteria { keeps_measures: E::HAS_VALUES, ..self.constants[block].criteria };
-        for (at_case, case) in cases.iter().enumerate() {
-            let may_cross = may_cross(case, fastest_in(tables), self.dt());
-            for (at_start, &start) in self.starts.iter().enumerate() {
-                let outcome = self.run_case(block, criteria, case, tables, may_cross, start, model);
-                each(at_case * self.starts.len() + at_start, outcome.into());
-            }
-        }
     }
 }

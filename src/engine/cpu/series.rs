@@ -60,7 +60,7 @@ impl Series {
                 entries.extend(table.iter().map(|&[_, towards]| towards));
                 entries.push(0.0);
             });
-            return VehicleTracks { speed, position, towards };
+            return [speed, position, towards];
         }
         let steps = motion.lateral_until.saturating_add(1).min(cap);
         let position = self.track(|entries| {
@@ -72,7 +72,7 @@ impl Series {
             entries.resize(entries.len() + steps as usize, motion.lateral_towards);
             entries.push(0.0);
         });
-        VehicleTracks { speed, position, towards }
+        [speed, position, towards]
     }
 
     /// Adds a series of at least one entry.
@@ -177,12 +177,12 @@ mod tests {
             let tracks = series.vehicle(&motion, &tables, 1200);
             let at = |track: Track, step: u32| series.entries[(track.first + step.min(track.last)) as usize];
             for step in 0..1200 {
-                assert_eq!(at(tracks.speed, step), motion.speed(&tables, step), "{speed:?} {step}");
+                assert_eq!(at(tracks[0], step), motion.speed(&tables, step), "{speed:?} {step}");
                 let state = motion.lateral(&tables, step);
-                assert_eq!(at(tracks.position, step), state.position, "{lateral:?} {step}");
-                assert_eq!(at(tracks.towards, step), state.towards, "{lateral:?} {step}");
+                assert_eq!(at(tracks[1], step), state.position, "{lateral:?} {step}");
+                assert_eq!(at(tracks[2], step), state.towards, "{lateral:?} {step}");
             }
-            for track in [tracks.speed, tracks.position, tracks.towards] {
+            for track in tracks {
                 let from = (track.first + track.last) as usize;
                 assert!(series.entries[from..from + ROWS].iter().all(|&v| v == series.entries[from]));
             }

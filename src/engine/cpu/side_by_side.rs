@@ -64,19 +64,16 @@ impl<'c> SideBySide<'c> {
     ) -> Self {
         let mut blocks: Vec<Block> = Vec::new();
         let mut lanes = 0;
-        let mut of_case = LaneArrays::<LANES>::idle();
         for (case, tracks) in cases {
             let constants = LaneConstants::new(simulation, case);
             for &start in starts {
                 let state = LaneState::new(simulation, case, start);
-                of_case.fill(0, &constants, tracks, &state, 0, true);
-                of_case.start(0, 0, state.gaps);
                 if lanes % LANES == 0 {
                     let places = [[[0.0; LANES]; 3]; 2];
                     blocks.push(Block { lanes: LaneArrays::idle(), places, moves_until: 0, finished: 0 });
                 }
                 let block = &mut blocks[lanes / LANES];
-                block.lanes.copy_from(lanes % LANES, &of_case, 0);
+                block.lanes.copy_from(lanes % LANES, &LaneArrays::of::<Unreacting>(&constants, tracks, &state, 0), 0);
                 block.moves_until = block.moves_until.max(steady_from(tracks));
                 lanes += 1;
             }

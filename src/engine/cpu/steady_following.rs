@@ -89,8 +89,8 @@ mod tests {
             driver: DriverState { deceleration, delay_steps: u32::from(between(0.0, 1.0) < 0.05) },
             reaction_step: NO_STEP,
             record: Record {
-                ttc: TtcMinimum { failed: Flag::of(between(0.0, 1.0) < 0.3), ..TtcMinimum::new() },
-                btn: BrakeThreatMaximum { failed: Flag::of(between(0.0, 1.0) < 0.3), ..BrakeThreatMaximum::new() },
+                ttc: TtcMinimum { failed: Flag::of(between(0.0, 1.0) < 0.3), ..TtcMinimum::start() },
+                btn: BrakeThreatMaximum { failed: Flag::of(between(0.0, 1.0) < 0.3), ..BrakeThreatMaximum::start() },
                 ..Record::new()
             },
             over: Flag::FALSE,

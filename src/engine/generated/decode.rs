@@ -52,7 +52,7 @@ pub(super) fn is_valid(recipe: &Recipe, basis: &[f32], point: &[f32]) -> bool {
 pub(super) fn case<R: Real>(recipe: &Recipe, basis: &[f32], point: &[f32], tables: &mut Tables<R>) -> LaneCase<R> {
     let number = |value: f32| R::from_f64(value.into());
     let is_reduced = recipe.path() == CasePath::Reduced;
-    let (mut principal, mut ahead) = (Motion::resting(), Motion::resting());
+    let (mut principal, mut ahead) = (Motion::default(), Motion::default());
     let (ego_speed, lead_gap, horizon);
     if is_reduced {
         let columns = &recipe.columns;
@@ -97,11 +97,10 @@ pub(super) fn case<R: Real>(recipe: &Recipe, basis: &[f32], point: &[f32], table
         half_lengths: number(recipe.half_lengths[which]),
         half_widths: number(recipe.half_widths[which]),
         gap_offset,
-        present_from: 0,
         present_until: NEVER,
-        attend_from: [0; lanesweep_model::driver::MODELS],
         used: 1,
         judged,
+        ..LaneOther::default()
     };
     let mut first = other(principal, 0, headway_gap, recipe.judged);
     let mut second = LaneOther { used: 0, present_until: 0, ..first };
@@ -112,7 +111,7 @@ pub(super) fn case<R: Real>(recipe: &Recipe, basis: &[f32], point: &[f32], table
     let marking_gap = (lane_width - ego_width) * R::HALF;
     let geometry = LaneGeometry { half_widths: first.half_widths, lane_width, marking_gap };
     for (model, rule) in recipe.attention.iter().enumerate() {
-        let [of_principal, of_ahead] = rule.widen::<R>().attend_from(
+        let [of_principal, of_ahead] = rule.cast::<R>().attend_from(
             steps_seen(recipe, &first.motion),
             geometry,
             |step| first.motion.lateral(tables, step).position,

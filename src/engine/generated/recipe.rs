@@ -10,8 +10,8 @@ use bytemuck::{Pod, Zeroable};
 use crate::lane_case::{LaneCase, LaneOther};
 use lanesweep_model::driver::{AttentionRule, MODELS};
 use lanesweep_model::scalar::Real;
+use lanesweep_model::scenario::Category;
 use lanesweep_model::scenario::parameterization::{LaneChange, Parameterization, SpeedProfile, Variable};
-use lanesweep_model::scenario::{Category, Motion};
 
 use super::points::MAX_PARAMETERS;
 
@@ -195,23 +195,15 @@ impl Recipe {
     /// criterion.
     pub(super) fn void<R: Real>(&self) -> LaneCase<R> {
         let nobody = LaneOther {
-            motion: Motion::resting(),
             half_lengths: R::from_f64(self.half_lengths[0].into()),
             half_widths: R::from_f64(self.half_widths[0].into()),
-            gap_offset: R::ZERO,
-            present_from: 0,
-            present_until: 0,
-            attend_from: [0; MODELS],
-            used: 0,
-            judged: 0,
+            ..LaneOther::default()
         };
         LaneCase {
             others: [nobody; 2],
-            ego_speed: R::ZERO,
             ego_width: R::from_f64(self.ego_width.into()),
             lane_width: R::from_f64(self.lane_width.into()),
-            horizon: 0,
-            pair: 0,
+            ..LaneCase::default()
         }
     }
 }

@@ -4,7 +4,6 @@ use std::fmt;
 
 use serde::Serialize;
 
-use crate::device_choice::pci_bus_id;
 use lanesweep_support::{Error, Result};
 
 /// Kind of device, as its driver reports it.
@@ -120,7 +119,7 @@ pub struct AdapterCard {
     pub driver: String,
     /// Version text of the driver; may be empty.
     pub driver_info: String,
-    /// Place on the PCI bus as `dddd:bb:dd.f`, lower case (`pci_bus_id`); `None` if unknown or not on a bus.
+    /// Place on the PCI bus as `dddd:bb:dd.f`, lower case; `None` if unknown or not on a bus.
     pub pci_bus_id: Option<String>,
     /// Vendor, as a PCI id where the vendor has one.
     pub vendor: u32,
@@ -180,7 +179,7 @@ impl AdapterCard {
             api,
             driver: info.driver,
             driver_info: info.driver_info,
-            pci_bus_id: pci_bus_id(&info.device_pci_bus_id),
+            pci_bus_id: Some(info.device_pci_bus_id.to_lowercase()).filter(|bus| !bus.is_empty()),
             vendor: info.vendor,
             device: info.device,
             limits: AdapterLimits {

@@ -3,7 +3,7 @@
 //! A software rasterizer runs on the same cores as the CPU backend, but slower, so it must be named.
 
 use super::adapters::{AdapterCard, DeviceKind};
-use crate::device_choice::{BackendChoice, DeviceName};
+use crate::device_choice::BackendChoice;
 use lanesweep_support::{Error, Place, Result, option};
 
 /// The index of the device to use, or `None` for the CPU.
@@ -14,7 +14,7 @@ use lanesweep_support::{Error, Place, Result, option};
 /// # Errors
 /// [`Error::Usage`]: a device together with `Cpu`; a name of no device or of several. [`Error::Device`]: `Gpu`
 /// without a GPU.
-pub fn choose(cards: &[AdapterCard], backend: BackendChoice, device: Option<&DeviceName>) -> Result<Option<usize>> {
+pub fn choose(cards: &[AdapterCard], backend: BackendChoice, device: Option<&str>) -> Result<Option<usize>> {
     match (backend, device) {
         (BackendChoice::Cpu, _) => backend.check(device).map(|()| None),
         (_, Some(device)) => named(cards, device).map(|card| Some(card.index)),
@@ -33,7 +33,7 @@ fn first_real(cards: &[AdapterCard]) -> Option<&AdapterCard> {
     cards.iter().filter(|card| card.is_real()).min_by_key(|card| rank(card))
 }
 
-fn named<'a>(cards: &'a [AdapterCard], device: &DeviceName) -> Result<&'a AdapterCard> {
+fn named<'a>(cards: &'a [AdapterCard], device: &str) -> Result<&'a AdapterCard> {
     let all = matching(cards, device);
     let Some(&first) = all.first() else {
         let problem = format!("no device of this machine matches `{device}`");
@@ -46,21 +46,22 @@ fn named<'a>(cards: &'a [AdapterCard], device: &DeviceName) -> Result<&'a Adapte
     Ok(first)
 }
 
-/// All matching cards, the preferred interface first. A complete name has priority: `NVIDIA L4` does not match
-/// `NVIDIA L40`.
-fn matching<'a>(cards: &'a [AdapterCard], device: &DeviceName) -> Vec<&'a AdapterCard> {
-    match device {
-        DeviceName::Index(index) => cards.iter().filter(|card| card.index == *index).collect(),
-        DeviceName::Pci(bus) => cards.iter().filter(|card| card.pci_bus_id.as_ref() == Some(bus)).collect(),
-        DeviceName::Name(name) => {
-            let name = name.to_lowercase();
-            let such = |test: &dyn Fn(&str) -> bool| -> Vec<&AdapterCard> {
-                cards.iter().filter(|card| test(&card.name.to_lowercase())).collect()
-            };
-            let complete = such(&|n| n == name);
-            if complete.is_empty() { such(&|n| n.contains(&name)) } else { complete }
-        }
+/// All matching cards, the preferred interface first: by their position, by a part of the PCI bus id as tools print it
+/// (`nvidia-smi` writes `00000000:65:00.0`), or by a part of the name. A complete name has priority: `NVIDIA L4` does not
+/// match `NVIDIA L40`.
+fn matching<'a>(cards: &'a [AdapterCard], device: &str) -> Vec<&'a AdapterCard> {
+    let device = device.trim().to_lowercase();
+    let such = |test: &dyn Fn(&AdapterCard) -> bool| cards.iter().filter(|card| test(card)).collect::<Vec<_>>();
+    if let Ok(index) = device.parse::<usize>() {
+        return such(&|card| card.index == index);
     }
+    if let Some(bus) = device.strip_prefix("pci:") {
+        let is_at = |own: &String| !bus.is_empty() && (own.ends_with(bus) || bus.ends_with(own));
+        return such(&|card| card.pci_bus_id.as_ref().is_some_and(is_at));
+    }
+    let complete = such(&|card| card.name.to_lowercase() == device);
+    let is_part = |card: &AdapterCard| !device.is_empty() && card.name.to_lowercase().contains(&device);
+    if complete.is_empty() { such(&is_part) } else { complete }
 }
 
 /// Whether two cards are one physical device. The bus id decides; without it, the same name under another interface
@@ -141,10 +142,6 @@ mod tests {
         vec![card(0, "llvmpipe (LLVM 15.0.6, 256 bits)", DeviceKind::Software, Api::Vulkan, None)]
     }
 
-    fn name(text: &str) -> DeviceName {
-        text.parse().unwrap()
-    }
-
     fn says(error: Error) -> String {
         format!("{error}; {}", error.help().unwrap())
     }
@@ -172,10 +169,10 @@ mod tests {
             card(1, "NVIDIA L4", DeviceKind::Discrete, Api::Dx12, Some(A)),
         ];
         assert_eq!(auto(&twice), Some(0));
-        for device in ["L4", "pci:17:00.0"] {
-            assert_eq!(choose(&twice, BackendChoice::Gpu, Some(&name(device))).unwrap(), Some(0), "{device}");
+        for device in ["L4", "pci:17:00.0", "PCI:00000000:17:00.0"] {
+            assert_eq!(choose(&twice, BackendChoice::Gpu, Some(device)).unwrap(), Some(0), "{device}");
         }
-        assert_eq!(choose(&twice, BackendChoice::Gpu, Some(&name("1"))).unwrap(), Some(1));
+        assert_eq!(choose(&twice, BackendChoice::Gpu, Some("1")).unwrap(), Some(1));
     }
 
     #[test]
@@ -190,7 +187,7 @@ mod tests {
         let software = software_only();
         for device in ["0", "llvmpipe", "LLVMPIPE (llvm"] {
             for backend in [BackendChoice::Auto, BackendChoice::Gpu] {
-                assert_eq!(choose(&software, backend, Some(&name(device))).unwrap(), Some(0), "{device}");
+                assert_eq!(choose(&software, backend, Some(device)).unwrap(), Some(0), "{device}");
             }
         }
     }
@@ -199,30 +196,30 @@ mod tests {
     fn the_processor_takes_no_device() {
         let cards = workstation();
         assert_eq!(choose(&cards, BackendChoice::Cpu, None).unwrap(), None);
-        let error = choose(&cards, BackendChoice::Cpu, Some(&name("L40"))).unwrap_err();
+        let error = choose(&cards, BackendChoice::Cpu, Some("L40")).unwrap_err();
         assert!(matches!(error, Error::Usage { .. }) && says(error).contains("leave out one of the two"));
     }
 
     #[test]
     fn a_name_of_several_devices_is_an_error_that_tells_them_apart() {
         let cards = workstation();
-        let error = choose(&cards, BackendChoice::Auto, Some(&name("l40"))).unwrap_err();
+        let error = choose(&cards, BackendChoice::Auto, Some("l40")).unwrap_err();
         assert!(matches!(error, Error::Usage { .. }));
         let text = says(error);
         for part in ["more than one", "1: NVIDIA L40", "pci:0000:17:00.0", "2: NVIDIA L40", "pci:0000:65:00.0"] {
             assert!(text.contains(part), "{part}: {text}");
         }
         assert!(!text.contains("llvmpipe"), "{text}");
-        assert_eq!(choose(&cards, BackendChoice::Auto, Some(&name("pci:65:00.0"))).unwrap(), Some(2));
-        assert_eq!(choose(&cards, BackendChoice::Auto, Some(&name("uhd"))).unwrap(), Some(0));
+        assert_eq!(choose(&cards, BackendChoice::Auto, Some("pci:65:00.0")).unwrap(), Some(2));
+        assert_eq!(choose(&cards, BackendChoice::Auto, Some("uhd")).unwrap(), Some(0));
     }
 
     #[test]
     fn the_same_device_under_another_interface_is_no_second_device() {
         let mut cards = workstation();
-        assert_eq!(choose(&cards, BackendChoice::Gpu, Some(&name("llvmpipe"))).unwrap(), Some(3));
+        assert_eq!(choose(&cards, BackendChoice::Gpu, Some("llvmpipe")).unwrap(), Some(3));
         cards.remove(2);
-        assert_eq!(choose(&cards, BackendChoice::Gpu, Some(&name("NVIDIA"))).unwrap(), Some(1));
+        assert_eq!(choose(&cards, BackendChoice::Gpu, Some("NVIDIA")).unwrap(), Some(1));
     }
 
     #[test]
@@ -231,19 +228,19 @@ mod tests {
             card(0, "NVIDIA L4", DeviceKind::Discrete, Api::Vulkan, Some(B)),
             card(1, "NVIDIA L40", DeviceKind::Discrete, Api::Vulkan, Some(A)),
         ];
-        assert_eq!(choose(&cards, BackendChoice::Auto, Some(&name("nvidia l4"))).unwrap(), Some(0));
-        assert!(choose(&cards, BackendChoice::Auto, Some(&name("L4"))).is_err());
+        assert_eq!(choose(&cards, BackendChoice::Auto, Some("nvidia l4")).unwrap(), Some(0));
+        assert!(choose(&cards, BackendChoice::Auto, Some("L4")).is_err());
     }
 
     #[test]
     fn a_name_of_nothing_lists_the_devices() {
-        for device in ["radeon", "6", "pci:aa:00.0"] {
-            let error = choose(&workstation(), BackendChoice::Auto, Some(&name(device))).unwrap_err();
+        for device in ["radeon", "6", "pci:aa:00.0", "pci:", ""] {
+            let error = choose(&workstation(), BackendChoice::Auto, Some(device)).unwrap_err();
             assert!(matches!(error, Error::Usage { .. }));
             let text = says(error);
-            assert!(text.contains(&format!("`{}`", name(device))) && text.contains("3: llvmpipe"), "{text}");
+            assert!(text.contains(&format!("`{}`", device)) && text.contains("3: llvmpipe"), "{text}");
         }
-        let error = choose(&[], BackendChoice::Gpu, Some(&name("0"))).unwrap_err();
+        let error = choose(&[], BackendChoice::Gpu, Some("0")).unwrap_err();
         assert!(says(error).contains("this machine has none"));
     }
 }

@@ -56,14 +56,48 @@ pub struct Tampering {
 /// A callback before a job.
 pub type BeforeJob = Arc<dyn Fn(u64, &wgpu::Device) -> std::result::Result<(), &'static str> + Send + Sync>;
 
-/// Key of a model's pipeline.
+/// A kernel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Kernel {
+    /// The lanes of a model: `shaders/lane.wgsl`. Launch, four inputs, three results.
+    Lanes(ModelId),
+    /// `shaders/generate.wgsl`. Generation, three inputs, cases, instants and what is counted of samples.
+    Generate,
+    /// `shaders/tally.wgsl`. Tally, samples and verdicts, counts.
+    Count,
+}
+
+impl Kernel {
+    /// Its name.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Kernel::Lanes(model) => model.name(),
+            Kernel::Generate => "generator",
+            Kernel::Count => "tally",
+        }
+    }
+
+    /// Index of its bindings among [`BINDINGS`].
+    fn bindings(self) -> usize {
+        match self {
+            Kernel::Lanes(_) => 0,
+            Kernel::Generate => 1,
+            Kernel::Count => 2,
+        }
+    }
+}
+
+/// Number of inputs and of results of each kernel, after a uniform buffer.
+const BINDINGS: [(usize, usize); 3] = [(4, 3), (3, 3), (2, 1)];
+
+/// Key of a pipeline.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct PipelineSpec {
-    pub model: ModelId,
+    pub kernel: Kernel,
     pub constants: Vec<(&'static str, f64)>,
 }
 
-/// A model's pipeline.
+/// A pipeline.
 struct Compiled {
     spec: PipelineSpec,
     pipeline: wgpu::ComputePipeline,
@@ -82,17 +116,11 @@ pub(super) struct Device {
     float_controls: bool,
     /// Maximum size of the samples that the device makes at a time, bytes.
     pub max_made_bytes: u64,
-    pub layout: wgpu::BindGroupLayout,
     pub options: GpuOptions,
     pub tampering: Tampering,
-    /// Bindings of the generator.
-    pub generator_layout: wgpu::BindGroupLayout,
-    /// Bindings of the counting.
-    pub tally_layout: wgpu::BindGroupLayout,
-    pipeline_layout: wgpu::PipelineLayout,
+    /// Of each kernel's [`BINDINGS`].
+    layouts: [wgpu::BindGroupLayout; 3],
     pipelines: Vec<Compiled>,
-    generator: Option<(Vec<(&'static str, f64)>, wgpu::ComputePipeline)>,
-    tally: Option<(Vec<(&'static str, f64)>, wgpu::ComputePipeline)>,
     trouble: Arc<Mutex<Option<String>>>,
 }
 
@@ -139,48 +167,27 @@ impl Device {
         let (uncaptured, lost) = (note(&trouble), note(&trouble));
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| uncaptured(error.to_string())));
         device.set_device_lost_callback(move |reason, message| lost(format!("it was lost ({reason:?}): {message}")));
-        let layout = device
-            .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("lane"), entries: &entries() });
-        let generator_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("generator"),
-            entries: &generator_entries(),
-        });
-        let tally_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("tally"),
-            entries: &tally_entries(),
-        });
-        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("lane"),
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
-        let timestamps = card.timestamps;
-        let name = card.name.clone();
-        let pipelines = Vec::new();
+        // The lanes of a job share one buffer of launches.
+        let layouts = [0, 1, 2].map(|kernel| bind_group_layout(&device, BINDINGS[kernel], kernel == 0));
         let opened = Device {
-            name,
+            name: card.name.clone(),
             device,
             queue,
             exact,
-            timestamps,
+            timestamps: card.timestamps,
             float_controls: card.float_controls,
             max_made_bytes: if card.kind == DeviceKind::Discrete { 1 << 30 } else { 256 << 20 },
-            layout,
-            generator_layout,
             options,
             tampering,
-            pipeline_layout,
-            pipelines,
-            generator: None,
-            tally: None,
-            tally_layout,
+            layouts,
+            pipelines: Vec::new(),
             trouble,
         };
         opened.untroubled()?;
         Ok(opened)
     }
 
-    /// The pipelines of models with their constants. Each is compiled once; those that are missing are compiled side by
+    /// Pipelines with their constants. Each is compiled once; those that are missing are compiled side by
     /// side.
     ///
     /// # Errors
@@ -195,11 +202,7 @@ impl Device {
                 missing.push(spec);
             }
         }
-        let compile = |spec: &&PipelineSpec| {
-            let source = shader::assemble(spec.model);
-            self.compile(spec.model.name(), source, ENTRY, &spec.constants, &self.pipeline_layout)
-        };
-        let compiled = missing.par_iter().map(compile).collect::<Result<Vec<_>>>()?;
+        let compiled = missing.par_iter().map(|spec| self.compile(spec)).collect::<Result<Vec<_>>>()?;
         let compiled = missing.into_iter().cloned().zip(compiled);
         let new = compiled.map(|(spec, pipeline)| Compiled { spec, pipeline, tuner: Tuner::default() });
         self.pipelines.extend(new);
@@ -210,63 +213,26 @@ impl Device {
         specs.map(of).collect()
     }
 
-    /// The pipeline of a generator with its constants; the last one is kept.
-    ///
-    /// # Errors
-    /// As [`Device::pipelines`].
-    pub(super) fn generator(&mut self, constants: &[(&'static str, f64)]) -> Result<wgpu::ComputePipeline> {
-        if let Some((known, pipeline)) = &self.generator
-            && known == constants
-        {
-            return Ok(pipeline.clone());
-        }
-        let layout = self.layout_of("generator", &self.generator_layout);
-        let pipeline = self.compile("generator", shader::assemble_generator(), GENERATE, constants, &layout)?;
-        self.generator = Some((constants.to_vec(), pipeline.clone()));
-        Ok(pipeline)
-    }
-
-    /// The pipeline that counts, with its constants; the last one is kept.
-    ///
-    /// # Errors
-    /// As [`Device::pipelines`].
-    pub(super) fn tally(&mut self, constants: &[(&'static str, f64)]) -> Result<wgpu::ComputePipeline> {
-        if let Some((known, pipeline)) = &self.tally
-            && known == constants
-        {
-            return Ok(pipeline.clone());
-        }
-        let layout = self.layout_of("tally", &self.tally_layout);
-        let pipeline = self.compile("tally", shader::assemble_tally(), COUNT, constants, &layout)?;
-        self.tally = Some((constants.to_vec(), pipeline.clone()));
-        Ok(pipeline)
-    }
-
-    fn layout_of(&self, label: &str, bindings: &wgpu::BindGroupLayout) -> wgpu::PipelineLayout {
-        self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some(label),
-            bind_group_layouts: &[Some(bindings)],
-            immediate_size: 0,
-        })
-    }
-
-    fn compile(
-        &self,
-        label: &str,
-        mut source: String,
-        entry: &str,
-        values: &[(&'static str, f64)],
-        layout: &wgpu::PipelineLayout,
-    ) -> Result<wgpu::ComputePipeline> {
+    fn compile(&self, PipelineSpec { kernel, constants: values }: &PipelineSpec) -> Result<wgpu::ComputePipeline> {
+        let (mut source, entry) = match *kernel {
+            Kernel::Lanes(model) => (shader::assemble(model), ENTRY),
+            Kernel::Generate => (shader::assemble_generator(), GENERATE),
+            Kernel::Count => (shader::assemble_tally(), COUNT),
+        };
         if let Some((from, to)) = &self.tampering.shader_patch {
             source = source.replace(from, to);
         }
-        let label = Some(label);
+        let label = Some(kernel.name());
+        let layout = self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label,
+            bind_group_layouts: &[Some(&self.layouts[kernel.bindings()])],
+            immediate_size: 0,
+        });
         let module = if self.exact {
             let words = exact_spirv(&source, entry, values, self.float_controls)?;
             let entry =
                 wgpu::PassthroughShaderEntryPoint { name: entry.to_owned().into(), workgroup_size: (WORKGROUP, 1, 1) };
-            // SAFETY: valid SPIR-V from naga, with the bindings of `entries` and decorations added.
+            // SAFETY: valid SPIR-V from naga, with the kernel's bindings and decorations added.
             unsafe {
                 self.device.create_shader_module_passthrough(wgpu::ShaderModuleDescriptorPassthrough {
                     label,
@@ -283,7 +249,7 @@ impl Device {
         let constants: &[(&str, f64)] = if self.exact { &[] } else { values };
         let pipeline = self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label,
-            layout: Some(layout),
+            layout: Some(&layout),
             module: &module,
             entry_point: Some(entry),
             compilation_options: wgpu::PipelineCompilationOptions { constants, ..Default::default() },
@@ -307,8 +273,7 @@ impl Device {
     /// A storage buffer with the given content.
     pub(super) fn upload<T: bytemuck::Pod>(&self, label: &str, content: &[T]) -> Result<wgpu::Buffer> {
         let bytes: &[u8] = bytemuck::cast_slice(content);
-        let limits = self.device.limits();
-        let max_bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let max_bytes = self.max_binding();
         if bytes.len() as u64 > max_bytes {
             let problem = format!("the {label} take {} bytes, but the device holds at most {max_bytes}", bytes.len());
             return Err(Error::device(
@@ -324,6 +289,12 @@ impl Device {
         Ok(buffer)
     }
 
+    /// Maximum size of a storage buffer, bytes.
+    pub(super) fn max_binding(&self) -> u64 {
+        let limits = self.device.limits();
+        limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
+    }
+
     /// Maximum number of lanes per model of a job, limited by the size of the result buffers.
     pub(super) fn max_lanes(&self, models: u64, bytes_per_lane: f64) -> u64 {
         let limits = self.device.limits();
@@ -333,12 +304,36 @@ impl Device {
         ((max_bytes as f64 / (models as f64 * bytes_per_lane)) as u64).min(MAX_LANES)
     }
 
-    /// Workgroups of a dispatch in two dimensions, because one dimension is limited to 65,535.
-    pub(super) fn grid(&self, groups: u32) -> (u32, u32) {
+    /// Buffers in the order of a kernel's bindings.
+    pub(super) fn bind(
+        &self,
+        kernel: Kernel,
+        first: wgpu::BindingResource,
+        others: &[&wgpu::Buffer],
+    ) -> wgpu::BindGroup {
+        let resources = std::iter::once(first).chain(others.iter().map(|buffer| buffer.as_entire_binding()));
+        let entry = |(binding, resource)| wgpu::BindGroupEntry { binding, resource };
+        let entries: Vec<wgpu::BindGroupEntry> = (0..).zip(resources).map(entry).collect();
+        let (label, layout) = (Some(kernel.name()), &self.layouts[kernel.bindings()]);
+        self.device.create_bind_group(&wgpu::BindGroupDescriptor { label, layout, entries: &entries })
+    }
+
+    /// Adds a dispatch to an encoder. Its workgroups are in two dimensions, because one is limited to 65,535.
+    pub(super) fn dispatch(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        pipeline: &wgpu::ComputePipeline,
+        (group, offsets): (&wgpu::BindGroup, &[u32]),
+        groups: u32,
+        timestamp_writes: Option<wgpu::ComputePassTimestampWrites>,
+    ) {
         let groups = groups.max(1);
         let max_groups = self.device.limits().max_compute_workgroups_per_dimension.max(1);
         let rows = groups.div_ceil(max_groups);
-        (groups.div_ceil(rows), rows)
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: None, timestamp_writes });
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, group, offsets);
+        pass.dispatch_workgroups(groups.div_ceil(rows), rows, 1);
     }
 
     /// How the invocations of a dispatch share its lanes.
@@ -355,7 +350,7 @@ impl Device {
             && self.options.lanes_per_invocation.is_none()
             && let Some(found) = known.tuner.observe(lanes, sharing, seconds)
         {
-            let (model, Sharing { lanes, burst }) = (spec.model.name(), found);
+            let (model, Sharing { lanes, burst }) = (spec.kernel.name(), found);
             tracing::debug!("{model}: {lanes} lanes per invocation, bursts of {burst} steps");
         }
     }
@@ -387,32 +382,21 @@ const BUSY_WORKGROUPS: u32 = 4224;
 /// A larger value hardly increases the use of a warp's lanes, and lengthens the end of a dispatch.
 const MAX_LANES_PER_INVOCATION: u32 = 32;
 
-/// The bindings of `shaders/lane.wgsl`, in their order: launch, four inputs, three results.
-fn entries() -> Vec<wgpu::BindGroupLayoutEntry> {
-    buffer_entries(4, 3, true)
-}
-
-/// The bindings of `shaders/generate.wgsl`, in their order: generation, four inputs, cases, instants and
-/// what is counted of samples.
-fn generator_entries() -> Vec<wgpu::BindGroupLayoutEntry> {
-    buffer_entries(3, 3, false)
-}
-
-/// The bindings of `shaders/tally.wgsl`, in their order: tally, samples and verdicts, counts and samples left.
-fn tally_entries() -> Vec<wgpu::BindGroupLayoutEntry> {
-    buffer_entries(2, 1, false)
-}
-
 /// A uniform buffer, inputs, results.
-fn buffer_entries(inputs: usize, results: usize, dynamic: bool) -> Vec<wgpu::BindGroupLayoutEntry> {
+fn bind_group_layout(
+    device: &wgpu::Device,
+    (inputs, results): (usize, usize),
+    is_dynamic: bool,
+) -> wgpu::BindGroupLayout {
     let kinds = std::iter::once(wgpu::BufferBindingType::Uniform)
         .chain(std::iter::repeat_n(wgpu::BufferBindingType::Storage { read_only: true }, inputs))
         .chain(std::iter::repeat_n(wgpu::BufferBindingType::Storage { read_only: false }, results));
     let entry = |(binding, ty)| wgpu::BindGroupLayoutEntry {
-        binding: binding as u32,
+        binding,
         visibility: wgpu::ShaderStages::COMPUTE,
-        ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: dynamic && binding == 0, min_binding_size: None },
+        ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: is_dynamic && binding == 0, min_binding_size: None },
         count: None,
     };
-    kinds.enumerate().map(entry).collect()
+    let entries: Vec<wgpu::BindGroupLayoutEntry> = (0..).zip(kinds).map(entry).collect();
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &entries })
 }

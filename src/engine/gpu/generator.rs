@@ -1,6 +1,6 @@
 //! The generator on the device: its inputs, and the dispatch that fills a session's cases and tables.
 
-use super::device::Device;
+use super::device::{Device, Kernel, PipelineSpec};
 use super::records::{DrawnRecord, Generation};
 use super::shader::WORKGROUP;
 use crate::LaneCase;
@@ -34,7 +34,7 @@ pub(super) struct GeneratorInputs {
 pub(super) struct GeneratorSetup {
     generation: Generation,
     recipe: Recipe,
-    constants: Vec<(&'static str, f64)>,
+    pipeline: PipelineSpec,
     numbers: Vec<u32>,
 }
 
@@ -59,8 +59,8 @@ impl GeneratorSetup {
             generation.seed_high = (stream.seed >> 32) as u32;
             generation.purpose = stream.purpose;
         }
-        let (recipe, constants) = (generator.recipe, generator.shader_constants());
-        GeneratorSetup { generation, recipe, constants, numbers }
+        let pipeline = PipelineSpec { kernel: Kernel::Generate, constants: generator.shader_constants() };
+        GeneratorSetup { generation, recipe: generator.recipe, pipeline, numbers }
     }
 
     /// Bytes of one sample: case, what is counted, and instants.
@@ -72,7 +72,7 @@ impl GeneratorSetup {
     pub(super) fn upload(&self, device: &mut Device) -> Result<GeneratorInputs> {
         use wgpu::BufferUsages as Use;
         Ok(GeneratorInputs {
-            pipeline: device.generator(&self.constants)?,
+            pipeline: device.pipelines(std::iter::once(&self.pipeline))?.swap_remove(0),
             template: self.generation,
             generation: device.buffer("generation", size_of::<Generation>() as u64, Use::UNIFORM | Use::COPY_DST),
             recipe: device.upload("recipe", &[self.recipe])?,
@@ -87,42 +87,23 @@ impl GeneratorSetup {
 pub(super) fn generate(device: &mut Device, inputs: &mut Inputs, first: u64, count: u32) -> Result<()> {
     let Some(made) = &inputs.generator else { return Err(device.failed("the session makes no cases")) };
     let template = made.template;
-    let room = |bytes: u64, buffer: &wgpu::Buffer| (buffer.size() < bytes).then_some(bytes);
     let samples = u64::from(count);
-    let storage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
-    if let Some(bytes) = room(samples * size_of::<LaneCase<f32>>() as u64, &inputs.cases) {
-        inputs.cases = device.buffer("cases", bytes, storage);
-    }
-    if let Some(bytes) = room(4 * samples * u64::from(template.stride), &inputs.speed) {
-        inputs.speed = device.buffer("instants", bytes, storage);
-    }
-    if let Some(bytes) = room(samples * size_of::<DrawnRecord>() as u64, &inputs.drawn) {
-        inputs.drawn = device.buffer("drawn samples", bytes, storage);
+    let sizes = [
+        (&mut inputs.cases, "cases", size_of::<LaneCase<f32>>() as u64),
+        (&mut inputs.speed, "instants", 4 * u64::from(template.stride)),
+        (&mut inputs.drawn, "drawn samples", size_of::<DrawnRecord>() as u64),
+    ];
+    for (buffer, label, bytes) in sizes {
+        if buffer.size() < samples * bytes {
+            *buffer = device.buffer(label, samples * bytes, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST);
+        }
     }
     let generation = Generation { index_low: first as u32, index_high: (first >> 32) as u32, count, ..template };
     device.queue.write_buffer(&made.generation, 0, bytemuck::bytes_of(&generation));
-    let buffers =
-        [&made.generation, &made.recipe, &made.numbers, &made.normal, &inputs.cases, &inputs.speed, &inputs.drawn];
-    let entries: Vec<wgpu::BindGroupEntry> = buffers
-        .iter()
-        .enumerate()
-        .map(|(binding, buffer)| wgpu::BindGroupEntry { binding: binding as u32, resource: buffer.as_entire_binding() })
-        .collect();
-    let group = device.device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("generator"),
-        layout: &device.generator_layout,
-        entries: &entries,
-    });
-    let (x, y) = device.grid(count.div_ceil(WORKGROUP));
-    let mut encoder =
-        device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("generator") });
-    {
-        let descriptor = wgpu::ComputePassDescriptor { label: Some("generator"), timestamp_writes: None };
-        let mut pass = encoder.begin_compute_pass(&descriptor);
-        pass.set_pipeline(&made.pipeline);
-        pass.set_bind_group(0, &group, &[]);
-        pass.dispatch_workgroups(x, y, 1);
-    }
+    let others = [&made.recipe, &made.numbers, &made.normal, &inputs.cases, &inputs.speed, &inputs.drawn];
+    let group = device.bind(Kernel::Generate, made.generation.as_entire_binding(), &others);
+    let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    device.dispatch(&mut encoder, &made.pipeline, (&group, &[]), count.div_ceil(WORKGROUP), None);
     device.queue.submit([encoder.finish()]);
     device.untroubled()
 }

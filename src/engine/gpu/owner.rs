@@ -66,25 +66,19 @@ pub(super) struct Prepared {
     pub max_cases: u64,
 }
 
-/// Description of the open device.
-#[derive(Debug, Clone)]
-pub(super) struct OpenedDevice {
-    pub exact: bool,
-}
-
-/// Starts the thread and opens the device in it.
+/// Starts the thread and opens the device in it. Returns also whether float operations reach the driver unchanged.
 pub(super) fn start(
     adapter: wgpu::Adapter,
     card: AdapterCard,
     options: GpuOptions,
     tampering: Tampering,
-) -> Result<(Sender<Command>, OpenedDevice, JoinHandle<()>)> {
+) -> Result<(Sender<Command>, bool, JoinHandle<()>)> {
     let (sender, commands) = mpsc::channel();
     let (opened_sender, opened) = mpsc::channel();
     let name = card.name.clone();
     let work = move || match Device::open(&adapter, &card, options, tampering) {
         Ok(device) => {
-            let _ = opened_sender.send(Ok(OpenedDevice { exact: device.exact }));
+            let _ = opened_sender.send(Ok(device.exact));
             DeviceOwner::new(device).serve(&commands);
         }
         Err(error) => {
@@ -193,10 +187,8 @@ impl DeviceOwner {
         let models = setup.models;
         let record = size_of::<super::records::OutcomeRecord>() as f64;
         let max_lanes = [0.5, record + 0.5].map(|bytes| self.device.max_lanes(models, bytes));
-        let limits = self.device.device.limits();
-        let max_bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let max_bytes =
-            max_bytes.min(if setup.generator.is_some() { self.device.max_made_bytes } else { MAX_CASE_BYTES });
+        let max_bytes = if setup.generator.is_some() { self.device.max_made_bytes } else { MAX_CASE_BYTES };
+        let max_bytes = self.device.max_binding().min(max_bytes);
         Ok(Prepared { session, max_lanes, max_cases: (max_bytes / sample_bytes).max(1) })
     }
 

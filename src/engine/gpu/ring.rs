@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use bytemuck::Zeroable;
 
-use super::device::{Device, PipelineSpec};
+use super::device::{Device, Kernel, PipelineSpec};
 use super::generator::Inputs;
 use super::pacing::Sharing;
 use super::records::{Launch, OutcomeRecord, Tally};
@@ -39,7 +39,7 @@ pub(super) struct Job {
 /// The counting of a job.
 #[derive(Debug, Clone)]
 pub(super) struct TallyJob {
-    pub constants: Vec<(&'static str, f64)>,
+    pub pipeline: PipelineSpec,
     /// Number of counts.
     pub counts: usize,
 }
@@ -114,40 +114,35 @@ pub(super) struct Slot {
 
 struct Buffers {
     launches: wgpu::Buffer,
-    verdicts: wgpu::Buffer,
-    outcomes: wgpu::Buffer,
-    finished: wgpu::Buffer,
+    /// In the order of [`RESULTS`].
+    results: [wgpu::Buffer; 4],
     tally: wgpu::Buffer,
-    counts: wgpu::Buffer,
     readback: wgpu::Buffer,
     timing: Option<(wgpu::QuerySet, wgpu::Buffer)>,
     dispatches: usize,
 }
 
-/// Size of each part of a job's results, bytes. The parts are consecutive in the read-back buffer.
+/// Results of a job. The last are counts of samples.
+const RESULTS: [&str; 4] = ["verdicts", "outcomes", "finished", "counts"];
+
+/// Size of each part of a job's results, bytes. The parts are consecutive in the read-back buffer, the times last.
 #[derive(Clone, Copy)]
 struct ResultSizes {
-    verdicts: u64,
-    outcomes: u64,
-    finished: u64,
-    counts: u64,
+    results: [u64; 4],
     times: u64,
 }
 
 impl ResultSizes {
     fn of(job: &Job) -> ResultSizes {
-        ResultSizes {
-            verdicts: (job.models * job.words() * 4) as u64,
-            outcomes: (job.models * job.records() * size_of::<OutcomeRecord>()) as u64,
-            finished: (job.dispatches.len() * 4) as u64,
-            counts: job.tally.as_ref().map_or(0, |tally| tally.counts as u64 * 4),
-            times: (job.dispatches.len() * 16) as u64,
-        }
+        let outcomes = job.models * job.records() * size_of::<OutcomeRecord>();
+        let counts = job.tally.as_ref().map_or(0, |tally| tally.counts * 4);
+        let results = [job.models * job.words() * 4, outcomes, job.dispatches.len() * 4, counts];
+        ResultSizes { results: results.map(|bytes| bytes as u64), times: (job.dispatches.len() * 16) as u64 }
     }
 
     fn total(&self) -> u64 {
         // Times are 64-bit words, so they start at a multiple of 8 bytes.
-        (self.verdicts + self.outcomes + self.finished + self.counts).next_multiple_of(8) + self.times
+        self.results.iter().sum::<u64>().next_multiple_of(8) + self.times
     }
 }
 
@@ -168,89 +163,56 @@ impl Slot {
         let dispatches = job.dispatches.len();
         let parts = ResultSizes::of(&job);
         self.grow(device, &parts, dispatches);
-        let pipelines = device.pipelines(job.dispatches.iter().map(|dispatch| &dispatch.pipeline))?;
-        let tally_pipeline = job.tally.as_ref().map(|tally| device.tally(&tally.constants)).transpose()?;
+        let specs = job.dispatches.iter().map(|dispatch| &dispatch.pipeline);
+        let pipelines = device.pipelines(specs.chain(job.tally.iter().map(|tally| &tally.pipeline)))?;
         let buffers = self.buffers.as_ref().ok_or_else(|| device.failed("it has no buffers"))?;
         let stride = launch_stride(device);
         let mut launches = vec![0_u8; stride as usize * dispatches];
-        let (mut grids, mut sharings) = (Vec::new(), Vec::new());
+        let (mut groups, mut sharings) = (Vec::new(), Vec::new());
         for at in 0..dispatches {
             let mut launch = job.launch(at);
             let sharing = device.sharing(&job.dispatches[at].pipeline, launch.lanes);
             launch.lanes_per_group = WORKGROUP * sharing.lanes;
             launch.burst_from = LONGEST_BURST - sharing.burst;
             sharings.push(sharing);
-            grids.push(device.grid(launch.lanes.div_ceil(launch.lanes_per_group)));
+            groups.push(launch.lanes.div_ceil(launch.lanes_per_group));
             let place = stride as usize * at;
             launches[place..place + size_of::<Launch>()].copy_from_slice(bytemuck::bytes_of(&launch));
         }
         device.queue.write_buffer(&buffers.launches, 0, &launches);
-        let binding = |binding, resource| wgpu::BindGroupEntry { binding, resource };
-        let launch = wgpu::BufferBinding {
+        let [verdicts, outcomes, finished, counts] = &buffers.results;
+        let launch = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
             buffer: &buffers.launches,
             offset: 0,
             size: wgpu::BufferSize::new(size_of::<Launch>() as u64),
-        };
-        let group = device.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("lane"),
-            layout: &device.layout,
-            entries: &[
-                binding(0, wgpu::BindingResource::Buffer(launch)),
-                binding(1, inputs.cases.as_entire_binding()),
-                binding(2, inputs.starts.as_entire_binding()),
-                binding(3, inputs.speed.as_entire_binding()),
-                binding(4, inputs.lateral.as_entire_binding()),
-                binding(5, buffers.verdicts.as_entire_binding()),
-                binding(6, buffers.outcomes.as_entire_binding()),
-                binding(7, buffers.finished.as_entire_binding()),
-            ],
         });
+        let others = [&inputs.cases, &inputs.starts, &inputs.speed, &inputs.lateral, verdicts, outcomes, finished];
+        let Some(first) = job.dispatches.first() else { return Err(device.failed("a job has no lanes")) };
+        let group = device.bind(first.pipeline.kernel, launch, &others);
         let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("job") });
         // The kernels add bits and counts to these words, so the words must start at zero.
-        let results = [
-            (&buffers.verdicts, parts.verdicts),
-            (&buffers.outcomes, parts.outcomes),
-            (&buffers.finished, parts.finished),
-            (&buffers.counts, parts.counts),
-        ];
-        for (buffer, bytes) in results.into_iter().filter(|(_, bytes)| *bytes > 0) {
+        let results = || buffers.results.iter().zip(parts.results).filter(|(_, bytes)| *bytes > 0);
+        for (buffer, bytes) in results() {
             encoder.clear_buffer(buffer, 0, Some(bytes));
         }
-        for (at, (pipeline, (x, y))) in pipelines.iter().zip(grids).enumerate() {
+        for (at, (pipeline, groups)) in pipelines.iter().zip(groups).enumerate() {
             let timestamp_writes = buffers.timing.as_ref().map(|(set, _)| wgpu::ComputePassTimestampWrites {
                 query_set: set,
                 beginning_of_pass_write_index: Some(2 * at as u32),
                 end_of_pass_write_index: Some(2 * at as u32 + 1),
             });
-            let label = Some(job.dispatches[at].pipeline.model.name());
-            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label, timestamp_writes });
-            pass.set_pipeline(pipeline);
-            pass.set_bind_group(0, &group, &[at as u32 * stride]);
-            pass.dispatch_workgroups(x, y, 1);
+            device.dispatch(&mut encoder, pipeline, (&group, &[at as u32 * stride]), groups, timestamp_writes);
         }
-        if let Some(pipeline) = &tally_pipeline {
+        if let Some(pipeline) = pipelines.get(dispatches) {
             let samples = job.cases;
             let record = Tally { samples, first_drawn: job.first_case, words: job.words() as u32 };
             device.queue.write_buffer(&buffers.tally, 0, bytemuck::bytes_of(&record));
-            let group = device.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("tally"),
-                layout: &device.tally_layout,
-                entries: &[
-                    binding(0, buffers.tally.as_entire_binding()),
-                    binding(1, inputs.drawn.as_entire_binding()),
-                    binding(2, buffers.verdicts.as_entire_binding()),
-                    binding(3, buffers.counts.as_entire_binding()),
-                ],
-            });
-            let (x, y) = device.grid(samples.div_ceil(WORKGROUP));
-            let mut pass = encoder
-                .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("tally"), timestamp_writes: None });
-            pass.set_pipeline(pipeline);
-            pass.set_bind_group(0, &group, &[]);
-            pass.dispatch_workgroups(x, y, 1);
+            let others = [&inputs.drawn, verdicts, counts];
+            let group = device.bind(Kernel::Count, buffers.tally.as_entire_binding(), &others);
+            device.dispatch(&mut encoder, pipeline, (&group, &[]), samples.div_ceil(WORKGROUP), None);
         }
         let mut at = 0;
-        for (buffer, bytes) in results.into_iter().filter(|(_, bytes)| *bytes > 0) {
+        for (buffer, bytes) in results() {
             encoder.copy_buffer_to_buffer(buffer, 0, &buffers.readback, at, bytes);
             at += bytes;
         }
@@ -315,33 +277,24 @@ impl Slot {
         use wgpu::BufferUsages as Use;
         let enough = self.buffers.as_ref().is_some_and(|b| {
             b.dispatches == dispatches
-                && b.verdicts.size() >= parts.verdicts
-                && b.outcomes.size() >= parts.outcomes
-                && b.finished.size() >= parts.finished
-                && b.counts.size() >= parts.counts
                 && b.readback.size() >= parts.total()
+                && b.results.iter().zip(parts.results).all(|(buffer, bytes)| buffer.size() >= bytes)
         });
         if enough {
             return;
         }
-        let limits = device.device.limits();
-        let max_bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let (max_binding, max_size) = (device.max_binding(), device.device.limits().max_buffer_size);
         // Sizes are powers of two, so that buffers are rarely replaced; the device's limit is the maximum.
         let room = |bytes: u64, max_bytes: u64| bytes.next_power_of_two().min(max_bytes).max(bytes);
         let results = Use::STORAGE | Use::COPY_SRC | Use::COPY_DST;
         let stride = u64::from(launch_stride(device));
         self.buffers = Some(Buffers {
             launches: device.buffer("launches", stride * dispatches as u64, Use::UNIFORM | Use::COPY_DST),
-            verdicts: device.buffer("verdicts", room(parts.verdicts, max_bytes), results),
-            outcomes: device.buffer("outcomes", room(parts.outcomes, max_bytes), results),
-            finished: device.buffer("finished", room(parts.finished, max_bytes), results),
+            results: std::array::from_fn(|at| {
+                device.buffer(RESULTS[at], room(parts.results[at], max_binding), results)
+            }),
             tally: device.buffer("tally", size_of::<Tally>() as u64, Use::UNIFORM | Use::COPY_DST),
-            counts: device.buffer("counts", room(parts.counts, max_bytes), results),
-            readback: device.buffer(
-                "results",
-                room(parts.total(), limits.max_buffer_size),
-                Use::MAP_READ | Use::COPY_DST,
-            ),
+            readback: device.buffer("results", room(parts.total(), max_size), Use::MAP_READ | Use::COPY_DST),
             timing: device.timestamps.then(|| {
                 let set = device.device.create_query_set(&wgpu::QuerySetDescriptor {
                     label: Some("times"),
@@ -367,15 +320,17 @@ fn launch_stride(device: &Device) -> u32 {
 fn read(device: &Device, flight: &Flight, bytes: &[u8], wall_s: f64) -> Result<Answer> {
     let Flight { job, parts, .. } = flight;
     let models = job.models;
-    let (verdicts, rest) = bytes.split_at(parts.verdicts as usize);
-    let (outcomes, rest) = rest.split_at(parts.outcomes as usize);
-    let (finished, rest) = rest.split_at(parts.finished as usize);
-    let counts = &rest[..parts.counts as usize];
+    let mut rest = bytes;
+    let [verdicts, outcomes, finished, counts] = parts.results.map(|bytes| {
+        let (part, after) = rest.split_at(bytes as usize);
+        rest = after;
+        part
+    });
     let finished: Vec<u32> = bytemuck::pod_collect_to_vec(finished);
     let times = &bytes[(parts.total() - parts.times) as usize..parts.total() as usize];
     let expected = |at: usize| job.launch(at).lanes;
     if let Some(at) = (0..finished.len()).find(|&at| finished[at] != expected(at)) {
-        let (name, lanes) = (job.dispatches[at].pipeline.model.name(), expected(at));
+        let (name, lanes) = (job.dispatches[at].pipeline.kernel.name(), expected(at));
         let problem = format!("it completed {} of {lanes} lanes of {name}", finished[at]);
         let help = format!(
             "use {}; if lanes have very many steps, a larger time step ({}) may help",

@@ -9,7 +9,7 @@ use std::thread::JoinHandle;
 use rayon::prelude::*;
 
 use super::adapters::{AdapterCard, Adapters, DeviceKind};
-use super::device::{GpuOptions, PipelineSpec, Tampering};
+use super::device::{GpuOptions, Kernel, PipelineSpec, Tampering};
 use super::generator::GeneratorSetup;
 use super::owner::{self, Cases, Command, Prepared, Request, Setup};
 use super::pacing::Pacer;
@@ -368,7 +368,10 @@ impl Drop for GpuSession<'_> {
 
 /// The pipelines of a block, one per model of the plan.
 fn specs(plan: &LanePlan, resolved: &Constants<f32>, specialization: Specialization) -> Vec<PipelineSpec> {
-    let spec = |&model| PipelineSpec { model, constants: shader::constants(resolved, model, specialization) };
+    let spec = |&model| PipelineSpec {
+        kernel: Kernel::Lanes(model),
+        constants: shader::constants(resolved, model, specialization),
+    };
     plan.models.iter().map(spec).collect()
 }
 
@@ -401,12 +404,6 @@ pub struct GpuBackend {
     thread: Option<JoinHandle<()>>,
 }
 
-impl std::fmt::Debug for Command {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("Command")
-    }
-}
-
 impl GpuBackend {
     /// Opens the device with this index.
     ///
@@ -435,8 +432,8 @@ impl GpuBackend {
             options.lanes_per_invocation.get_or_insert(1);
             options.split_scenes.get_or_insert(false);
         }
-        let (commands, opened, thread) = owner::start(adapter, card.clone(), options.clone(), tampering)?;
-        Ok(GpuBackend { card, exact: opened.exact, options, commands, thread: Some(thread) })
+        let (commands, exact, thread) = owner::start(adapter, card.clone(), options.clone(), tampering)?;
+        Ok(GpuBackend { card, exact, options, commands, thread: Some(thread) })
     }
 
     /// Description of the device.

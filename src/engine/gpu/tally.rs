@@ -1,5 +1,6 @@
 //! What the counting kernel is told of a plan.
 
+use super::device::{Kernel, PipelineSpec};
 use super::ring::TallyJob;
 use crate::{CountLayout, LanePlan};
 
@@ -16,5 +17,6 @@ pub(super) fn counter(plan: &LanePlan) -> Option<(CountLayout, TallyJob)> {
         && plan.blocks.len() == 1
         && layout.of_every_sample() <= CountLayout::GATHERED
         && layout.total() <= MAX_COUNTS;
-    fits.then(|| (layout, TallyJob { constants: layout.shader_constants(), counts: layout.total() }))
+    let pipeline = PipelineSpec { kernel: Kernel::Count, constants: layout.shader_constants() };
+    fits.then(|| (layout, TallyJob { pipeline, counts: layout.total() }))
 }

@@ -103,39 +103,11 @@ impl Threshold {
         Threshold::StepCap,
     ];
 
-    /// Name in keys.
-    pub fn name(self) -> &'static str {
-        match self {
-            Threshold::Ttc => "ttc",
-            Threshold::Btn => "btn",
-            Threshold::BtnRoom => "btn-room",
-            Threshold::Reg157Ttc => "reg157-ttc",
-            Threshold::Reg157Gate => "reg157-gate",
-            Threshold::CchdmTtc => "cchdm-ttc",
-            Threshold::CchdmGate => "cchdm-gate",
-            Threshold::RssLongitudinal => "rss-longitudinal",
-            Threshold::RssLateral => "rss-lateral",
-            Threshold::PfsSafe => "pfs-safe",
-            Threshold::PfsUnsafe => "pfs-unsafe",
-            Threshold::CfsSafe => "cfs-safe",
-            Threshold::CfsUnsafe => "cfs-unsafe",
-            Threshold::FsmGate => "fsm-gate",
-            Threshold::LateralSpeed => "lateral-speed",
-            Threshold::LateralGap => "lateral-gap",
-            Threshold::EgoWidth => "ego-width",
-            Threshold::Gap => "gap",
-            Threshold::Behind => "behind",
-            Threshold::Centres => "centres",
-            Threshold::EqualSpeeds => "equal-speeds",
-            Threshold::StandingEgo => "standing-ego",
-            Threshold::Attention => "attention",
-            Threshold::Appearance => "appearance",
-            Threshold::Disappearance => "disappearance",
-            Threshold::SpeedEvent => "speed-event",
-            Threshold::LateralEvent => "lateral-event",
-            Threshold::Horizon => "horizon",
-            Threshold::StepCap => "step-cap",
-        }
+    /// Name in keys: `reg157-ttc`.
+    pub fn name(self) -> String {
+        let name = format!("{self:?}");
+        let lower = name.chars().flat_map(|c| c.is_uppercase().then_some('-').into_iter().chain(c.to_lowercase()));
+        lower.skip(1).collect()
     }
 
     /// The threshold of a unit of any category.

@@ -111,32 +111,25 @@ impl ThresholdCases {
 
     /// The case on its threshold and its two neighbours; `None` if these numbers have no exact solution.
     fn cases(&self, draw: &mut CaseRandom, block: usize, unit: u64) -> Option<[FirstStep; 3]> {
+        use LateralStart::{Ahead, Beside, Coming};
+        use Threshold::*;
+
         let threshold = Threshold::of_unit(unit);
         let across = match threshold {
-            Threshold::Reg157Gate | Threshold::CchdmGate | Threshold::RssLateral => {
-                [LateralStart::Coming, LateralStart::Beside][draw.below(2)]
-            }
-            Threshold::LateralGap | Threshold::EgoWidth => [LateralStart::Coming, LateralStart::Beside][draw.below(2)],
-            Threshold::FsmGate | Threshold::LateralEvent => LateralStart::Coming,
-            Threshold::LateralSpeed => LateralStart::Beside,
-            Threshold::Centres => [LateralStart::Ahead, LateralStart::Beside][draw.below(2)],
-            _ => LateralStart::Ahead,
+            Reg157Gate | CchdmGate | RssLateral | LateralGap | EgoWidth => [Coming, Beside][draw.below(2)],
+            FsmGate | LateralEvent => Coming,
+            LateralSpeed => Beside,
+            Centres => [Ahead, Beside][draw.below(2)],
+            _ => Ahead,
         };
         let first_step = self.base(draw, unit, across);
         match threshold {
-            Threshold::Attention
-            | Threshold::Appearance
-            | Threshold::Disappearance
-            | Threshold::SpeedEvent
-            | Threshold::LateralEvent
-            | Threshold::Horizon
-            | Threshold::StepCap => self.in_time(draw, block, threshold, first_step),
-            Threshold::Reg157Gate
-            | Threshold::CchdmGate
-            | Threshold::RssLateral
-            | Threshold::LateralSpeed
-            | Threshold::LateralGap
-            | Threshold::EgoWidth => self.across_the_road(draw, block, threshold, first_step),
+            Attention | Appearance | Disappearance | SpeedEvent | LateralEvent | Horizon | StepCap => {
+                self.in_time(draw, block, threshold, first_step)
+            }
+            Reg157Gate | CchdmGate | RssLateral | LateralSpeed | LateralGap | EgoWidth => {
+                self.across_the_road(draw, block, threshold, first_step)
+            }
             _ => self.along_the_road(draw, block, threshold, first_step),
         }
     }
@@ -155,7 +148,7 @@ impl ThresholdCases {
         // The smallest relevant gap: centres side by side.
         let nearest = -s.half_lengths;
         let signed = |draw: &mut CaseRandom, gap: f32| if gap < -nearest && draw.chance(0.25) { -gap } else { gap };
-        let judged = |gap: f32| criteria.btn.update(BrakeThreatMaximum::new(), Flag::TRUE, gap, dv, true);
+        let judged = |gap: f32| criteria.btn.update(BrakeThreatMaximum::start(), Flag::TRUE, gap, dv, true);
         let fsm = &constants.fsm;
         s.gap = match on {
             Threshold::Ttc => criteria.ttc.threshold * dv,

@@ -118,27 +118,6 @@ impl CaseRandom {
     }
 }
 
-/// Names of the output words, in the order of [`words`].
-pub const WORDS: [&str; 17] = [
-    "verdicts",
-    "contact",
-    "contact_with",
-    "end",
-    "reaction_step",
-    "contact_step",
-    "end_step",
-    "impact_speed",
-    "impact_closing_speed",
-    "min_ttc",
-    "max_btn",
-    "min_gap",
-    "min_thw",
-    "max_drac",
-    "tet_steps",
-    "tit",
-    "pet",
-];
-
 /// Differing lanes that a comparison keeps.
 const MAX_EXAMPLES: usize = 10;
 
@@ -192,7 +171,7 @@ impl DifferingLane {
     /// Names of the words that differ.
     pub fn names(&self) -> Vec<&'static str> {
         let (a, b) = (words(&self.tested), words(&self.cpu));
-        WORDS.into_iter().enumerate().filter(|(at, _)| a[*at] != b[*at]).map(|(_, name)| name).collect()
+        a.into_iter().zip(b).filter(|(a, b)| a != b).map(|((name, _), _)| name).collect()
     }
 
     /// Sort key: differences in verdicts first, then in steps, then the number of words.

@@ -29,6 +29,17 @@ pub(super) enum LateralRole {
     Within,
 }
 
+impl LateralRole {
+    /// Magnitudes of the first and the last position, m.
+    pub(super) fn ends(self, draw: &mut CaseRandom) -> (f64, f64) {
+        match self {
+            LateralRole::In => (draw.between(1.8, 4.2), draw.between(-0.4, 0.6)),
+            LateralRole::Out => (draw.between(-0.3, 0.4), draw.between(2.2, 4.4)),
+            LateralRole::Within => (draw.between(-0.8, 0.8), draw.between(-0.8, 0.8)),
+        }
+    }
+}
+
 /// The shared series.
 pub(super) struct Pool {
     /// All series in sequence.
@@ -149,11 +160,7 @@ fn braked_speed(draw: &mut CaseRandom, dt_s: f64) -> Vec<f64> {
 fn lateral(draw: &mut CaseRandom, across: LateralRole, dt_s: f64) -> Vec<[f64; 2]> {
     let len = length(draw).max(2);
     let side = draw.sign();
-    let (start, end) = match across {
-        LateralRole::In => (draw.between(1.8, 4.2), draw.between(-0.4, 0.6)),
-        LateralRole::Out => (draw.between(-0.3, 0.4), draw.between(2.2, 4.4)),
-        LateralRole::Within => (draw.between(-0.8, 0.8), draw.between(-0.8, 0.8)),
-    };
+    let (start, end) = across.ends(draw);
     let (from, seconds) = (draw.below(1 + len / 6) as f64, draw.between(1.5, 7.0));
     let noise = if draw.chance(0.4) { draw.between(0.0, 0.03) } else { 0.0 };
     let position: Vec<f64> = (0..len)

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::pool::{LateralRole, Pool, Slice};
 use super::{CaseRandom, Purpose, SetOptions};
-use crate::{Block, CaseSource, Headway, LaneCase, LaneOther, LanePlan, NO_STEP};
+use crate::{Block, CaseSource, Headway, LaneCase, LanePlan, NO_STEP};
 use lanesweep_model::driver::MODELS;
 use lanesweep_model::profile::{CutOutTarget, Profile};
 use lanesweep_model::scenario::{
@@ -273,12 +273,10 @@ fn kinematic_speed(draw: &mut CaseRandom, braked: bool) -> Speed {
 
 fn kinematic_lateral(draw: &mut CaseRandom, across: LateralRole) -> Lateral {
     let side = draw.sign();
-    let (start, end) = match across {
-        LateralRole::In => (draw.between(1.8, 4.2), draw.between(-0.4, 0.6)),
-        LateralRole::Out => (draw.between(-0.3, 0.4), draw.between(2.2, 4.4)),
-        LateralRole::Within if draw.chance(0.6) => return Lateral::Centred,
-        LateralRole::Within => (draw.between(-0.8, 0.8), draw.between(-0.8, 0.8)),
-    };
+    if across == LateralRole::Within && draw.chance(0.6) {
+        return Lateral::Centred;
+    }
+    let (start, end) = across.ends(draw);
     let rate = draw.between(0.3, 2.5) * if end > start { 1.0 } else { -1.0 };
     Lateral::Kinematic { start_m: side * start, rate_mps: side * rate, end_m: side * end }
 }
@@ -327,16 +325,12 @@ fn degenerate(draw: &mut CaseRandom, corner: usize, case: &mut Case) {
 
 /// Vehicles that appear late, leave early, or are noticed late.
 fn late(draw: &mut CaseRandom, lane: &mut LaneCase<f64>) {
-    let appear = |draw: &mut CaseRandom, other: &mut LaneOther<f64>| {
+    for other in &mut lane.others[..1 + lane.pair as usize] {
         other.present_from = draw.below(60) as u32;
         if draw.chance(0.5) {
             other.present_until = other.present_from + draw.below(150) as u32;
         }
         other.attend_from = [0; MODELS].map(|_: u32| draw.below(80) as u32);
         other.judged = u32::from(draw.chance(0.8));
-    };
-    let used = 1 + lane.pair as usize;
-    for other in &mut lane.others[..used] {
-        appear(draw, other);
     }
 }

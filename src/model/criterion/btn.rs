@@ -69,7 +69,7 @@ pub struct BrakeThreatMaximum<R> {
 impl<R: Real> BrakeThreatMaximum<R> {
     /// Initial value: 0.
     #[inline(always)]
-    pub fn new() -> Self {
+    pub fn start() -> Self {
         BrakeThreatMaximum { numerator: R::ZERO, denominator: R::ONE, failed: Flag::FALSE }
     }
 
@@ -97,12 +97,6 @@ impl<R: Real> BrakeThreatMaximum<R> {
             denominator: higher.choose(denominator, self.denominator),
             ..self
         }
-    }
-}
-
-impl<R: Real> Default for BrakeThreatMaximum<R> {
-    fn default() -> Self {
-        Self::new()
     }
 }
 
@@ -243,7 +237,7 @@ impl<R: Real> BrakeThreat<R> {
 
     /// The number at one instant: gap, m, closing speed, m/s. For traces and tests.
     pub fn at(&self, gap: R, closing: R) -> f64 {
-        self.value(&self.update(BrakeThreatMaximum::new(), Flag::TRUE, gap, closing, true))
+        self.value(&self.update(BrakeThreatMaximum::start(), Flag::TRUE, gap, closing, true))
     }
 
     /// v ≥ a²/(2j): the ramp ends before the closing speed reaches 0.
@@ -335,7 +329,7 @@ mod tests {
             let threat = threat(form);
             for v in [0.5, 2.0, 7.0, 19.0, 33.0] {
                 for gap in [0.3, 1.0, 4.0, 11.0, 60.0, 150.0] {
-                    let judged = threat.update(BrakeThreatMaximum::new(), Flag::TRUE, gap, v, true);
+                    let judged = threat.update(BrakeThreatMaximum::start(), Flag::TRUE, gap, v, true);
                     assert_eq!(judged.failed.holds(), threat.value(&judged) > 0.8, "{form:?} v {v} gap {gap}");
                 }
             }

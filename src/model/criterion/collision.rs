@@ -3,9 +3,10 @@
 use crate::scalar::{Flag, Real};
 
 /// How two vehicles touch.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 pub enum Contact {
     /// They do not.
+    #[default]
     None,
     /// Type 1: the other vehicle hits the ego from the side or behind (x_e > x_o, centres).
     BySide,

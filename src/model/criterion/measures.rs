@@ -34,7 +34,7 @@ pub struct Measures<R> {
 impl<R: Real> Measures<R> {
     /// Initial values: infinite THW, no PET, 0 otherwise.
     #[inline(always)]
-    pub fn new() -> Self {
+    pub fn start() -> Self {
         Measures {
             thw_gap: R::ONE,
             thw_speed: R::ZERO,
@@ -120,11 +120,5 @@ impl<R: Real> Measures<R> {
         } else {
             Some(driven)
         }
-    }
-}
-
-impl<R: Real> Default for Measures<R> {
-    fn default() -> Self {
-        Self::new()
     }
 }

@@ -23,7 +23,7 @@ pub struct TtcMinimum<R> {
 impl<R: Real> TtcMinimum<R> {
     /// Initial value: infinite.
     #[inline(always)]
-    pub fn new() -> Self {
+    pub fn start() -> Self {
         TtcMinimum { gap: R::ONE, closing: R::ZERO, failed: Flag::FALSE }
     }
 
@@ -31,12 +31,6 @@ impl<R: Real> TtcMinimum<R> {
     #[inline(always)]
     pub fn value(&self) -> R {
         if self.closing > R::ZERO { self.gap.exact_div(self.closing) } else { R::INFINITY }
-    }
-}
-
-impl<R: Real> Default for TtcMinimum<R> {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

@@ -128,23 +128,15 @@ impl AttentionRule<f64> {
             threshold: trigger_mps2 * dt_s * (1.0 + ROUNDING),
         }
     }
-
-    /// Rounds the constants once to the lane arithmetic.
-    pub fn cast<R: Real>(&self) -> AttentionRule<R> {
-        let AttentionRule { kind, delay_steps, below_trigger, threshold } = *self;
-        AttentionRule { kind, delay_steps, below_trigger, threshold: R::from_f64(threshold) }
-    }
-}
-
-impl AttentionRule<f32> {
-    /// Converts the constants exactly to the lane arithmetic.
-    pub fn widen<R: Real>(&self) -> AttentionRule<R> {
-        let AttentionRule { kind, delay_steps, below_trigger, threshold } = *self;
-        AttentionRule { kind, delay_steps, below_trigger, threshold: R::from_f64(threshold.into()) }
-    }
 }
 
 impl<R: Real> AttentionRule<R> {
+    /// Rounds the constants once to another arithmetic; exact to a wider one.
+    pub fn cast<S: Real>(&self) -> AttentionRule<S> {
+        let AttentionRule { kind, delay_steps, below_trigger, threshold } = *self;
+        AttentionRule { kind, delay_steps, below_trigger, threshold: S::from_f64(threshold.to_f64()) }
+    }
+
     /// Whether the driver may react to a vehicle from the first step on, whatever its speed does: any vehicle, or one that
     /// stays in the ego's path.
     pub fn attends_at_once(&self, stays_in_path: bool) -> bool {

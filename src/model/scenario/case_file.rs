@@ -3,7 +3,7 @@
 use std::fmt;
 
 use serde::Deserialize;
-use serde::de::{self, DeserializeSeed, Deserializer, Error as _, MapAccess, Visitor};
+use serde::de::{DeserializeSeed, Deserializer, Error as _, MapAccess, Visitor};
 
 use super::case_parameters::{CaseParameters, NamedNumber};
 use super::case_quantity::NUMBERS;
@@ -17,6 +17,32 @@ pub struct CaseFile {
     pub models: Option<String>,
     /// The numbers of the case.
     pub parameters: CaseParameters,
+}
+
+/// A key of a file.
+#[derive(Deserialize)]
+#[serde(try_from = "String")]
+enum Key {
+    Category,
+    Models,
+    Number(NamedNumber, String),
+}
+
+impl TryFrom<String> for Key {
+    type Error = String;
+
+    fn try_from(name: String) -> Result<Key, String> {
+        match (name.as_str(), NamedNumber::find(&name).map_err(|error| message(&error))?) {
+            ("category", _) => Ok(Key::Category),
+            ("models", _) => Ok(Key::Models),
+            (_, Some(number)) => Ok(Key::Number(number, name)),
+            (_, None) => {
+                let known = ["category", "models"].into_iter().chain(NUMBERS.iter().map(|number| number.key));
+                let known: Vec<String> = known.map(|key| format!("`{key}`")).collect();
+                Err(format!("unknown field `{name}`, expected one of {}", known.join(", ")))
+            }
+        }
+    }
 }
 
 impl<'de> Deserialize<'de> for CaseFile {
@@ -35,14 +61,13 @@ impl<'de> Visitor<'de> for Keys {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<CaseFile, A::Error> {
-        let mut file = CaseFile::default();
-        let mut seen: Vec<(NamedNumber, String)> = Vec::new();
-        while let Some(key) = map.next_key_seed(Key(&seen))? {
+        let (mut file, mut seen) = (CaseFile::default(), Vec::new());
+        while let Some(key) = map.next_key()? {
             match key {
-                FileKey::Category => file.parameters.category = Some(map.next_value()?),
-                FileKey::Models => file.models = Some(map.next_value()?),
-                FileKey::Number(number, name) => {
-                    map.next_value_seed(Number(number, &mut file.parameters))?;
+                Key::Category => file.parameters.category = Some(map.next_value()?),
+                Key::Models => file.models = Some(map.next_value()?),
+                Key::Number(number, name) => {
+                    map.next_value_seed(Number { number, name: &name, seen: &seen, case: &mut file.parameters })?;
                     seen.push((number, name));
                 }
             }
@@ -51,81 +76,42 @@ impl<'de> Visitor<'de> for Keys {
     }
 }
 
-enum FileKey {
-    Category,
-    Models,
-    Number(NamedNumber, String),
+/// Reads the value of a number into its field, after other numbers. Errors have the line of the value.
+struct Number<'a> {
+    number: NamedNumber,
+    name: &'a str,
+    seen: &'a [(NamedNumber, String)],
+    case: &'a mut CaseParameters,
 }
 
-/// Reads a key; the numbers before it have these names.
-struct Key<'a>(&'a [(NamedNumber, String)]);
-
-impl<'de> DeserializeSeed<'de> for Key<'_> {
-    type Value = FileKey;
-
-    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<FileKey, D::Error> {
-        let name = String::deserialize(deserializer)?;
-        match (name.as_str(), NamedNumber::find(&name)) {
-            ("category", _) => Ok(FileKey::Category),
-            ("models", _) => Ok(FileKey::Models),
-            (_, Ok(Some(number))) => match self.0.iter().find(|(other, _)| other.key() == number.key()) {
-                Some((_, other)) => {
-                    Err(D::Error::custom(format!("`{name}` says the same as `{other}`: leave out one of the two")))
-                }
-                None => Ok(FileKey::Number(number, name)),
-            },
-            (_, Err(error)) => Err(custom(&error)),
-            (_, Ok(None)) => {
-                let known: Vec<String> = ["category", "models"]
-                    .into_iter()
-                    .chain(NUMBERS.iter().map(|number| number.key))
-                    .map(|key| format!("`{key}`"))
-                    .collect();
-                Err(D::Error::custom(format!("unknown field `{name}`, expected one of {}", known.join(", "))))
-            }
-        }
-    }
+/// The value of a number.
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "expected a number, or a text with its unit")]
+enum Value {
+    Number(f64),
+    Text(String),
 }
-
-/// Reads the value of a number into its field.
-struct Number<'a>(NamedNumber, &'a mut CaseParameters);
 
 impl<'de> DeserializeSeed<'de> for Number<'_> {
     type Value = ();
 
     fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
-        deserializer.deserialize_any(self)
-    }
-}
-
-impl Visitor<'_> for Number<'_> {
-    type Value = ();
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a number, or a text with its unit")
-    }
-
-    fn visit_f64<E: de::Error>(self, number: f64) -> Result<(), E> {
-        self.0.set(self.1, Written::Number(number)).map_err(|error| custom(&error))
-    }
-
-    fn visit_i64<E: de::Error>(self, number: i64) -> Result<(), E> {
-        self.visit_f64(number as f64)
-    }
-
-    fn visit_u64<E: de::Error>(self, number: u64) -> Result<(), E> {
-        self.visit_f64(number as f64)
-    }
-
-    fn visit_str<E: de::Error>(self, text: &str) -> Result<(), E> {
-        self.0.set(self.1, Written::Text(text)).map_err(|error| custom(&error))
+        let Number { number, name, seen, case } = self;
+        if let Some((_, other)) = seen.iter().find(|(other, _)| other.key() == number.key()) {
+            return Err(D::Error::custom(format!("`{name}` says the same as `{other}`: leave out one of the two")));
+        }
+        let set = match &Value::deserialize(deserializer)? {
+            Value::Number(value) => number.set(case, Written::Number(*value)),
+            Value::Text(text) => number.set(case, Written::Text(text)),
+        };
+        set.map_err(|error| D::Error::custom(message(&error)))
     }
 }
 
 /// The message of an error, with what to do; the reader adds the place.
-fn custom<E: de::Error>(error: &Error) -> E {
+fn message(error: &Error) -> String {
     match error {
-        Error::Usage { problem, help, .. } => E::custom(format!("{problem}; {help}")),
-        other => E::custom(other.to_string()),
+        Error::Usage { problem, help, .. } => format!("{problem}; {help}"),
+        other => other.to_string(),
     }
 }

@@ -98,7 +98,7 @@ pub struct Scenario {
     /// The ego.
     pub ego: Ego,
     /// Width of the ego's lane, m.
-    #[serde(default = "default_lane_width")]
+    #[serde(default = "super::parameterization::default_lane_width_m")]
     pub lane_width: f64,
     /// Side that the target comes from or leaves to; LVD: side of the lane centre where it starts.
     pub side: Side,
@@ -144,10 +144,6 @@ pub struct Scenario {
 
 fn yes() -> bool {
     true
-}
-
-fn default_lane_width() -> f64 {
-    3.5
 }
 
 impl Scenario {

@@ -131,7 +131,7 @@ fn lanes<R: Real>(
 fn widened<R: Real>(case: &LaneCase<R>) -> LaneCase<f64> {
     LaneCase {
         others: case.others.map(|o| LaneOther {
-            motion: Motion::resting(),
+            motion: Motion::default(),
             half_lengths: o.half_lengths.to_f64(),
             half_widths: o.half_widths.to_f64(),
             gap_offset: o.gap_offset.to_f64(),

@@ -212,7 +212,7 @@ pub(crate) fn crude_rows(
             }
             for headway in 0..headways {
                 let failures = tally.failures[cell(headway)];
-                let counts = Counts { runs, failures, voids: tally.voids, tries: tally.tries };
+                let counts = Counts { runs, failures, voids: tally.voids };
                 let estimate = from_counts(&counts, level, stopped);
                 push(options.headway_name(headway), estimate, &[cell(headway)]);
             }

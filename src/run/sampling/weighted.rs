@@ -62,7 +62,7 @@ impl Sample {
         let nominal = truncated(&self.density)?;
         let run = search(&nominal, &self.limit_state(executor.clone()), options, self.options.seed)?;
         let draws = self.draws_after(&run.questions, options);
-        Ok(Weighted { proposal: run.proposal_or(&nominal)?, draws, search: Some(run) })
+        Ok(Weighted { proposal: run.proposal_or(&nominal), draws, search: Some(run) })
     }
 
     /// The final draws after a search.

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::{Study, StudyCases, WINDOW};
 use crate::score::{Best, ClaimResult, HeadwayFailures, ScoreTable, best_parameterizations, check_claims};
 use lanesweep_engine::lane_case::LaneCase;
-use lanesweep_engine::{Constants, Headway, Partial, Silent, Start, UnitCounts};
+use lanesweep_engine::{Constants, Headway, Partial, Start, UnitCounts, silent};
 use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::scenario::Tables;
@@ -99,7 +99,7 @@ impl StudyCases {
         let least = |(model, capped): (&ModelId, &u32)| {
             let run = |headway: &Headway| {
                 let start = Start::Gap(headway.start::<f64>().gap(case.ego_speed));
-                constants.run(*model, &case, &tables, start, &mut Silent)
+                constants.run(*model, &case, &tables, start, silent)
             };
             let is_run = *capped > 0 && model.foreign().is_none();
             let headways = plan.headways.iter().filter(|_| is_run);

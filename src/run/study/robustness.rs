@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use lanesweep_engine::{Chunk, Constants, LaneKey, LanePlan, Outcome, Silent, Start};
+use lanesweep_engine::{Chunk, Constants, LaneKey, LanePlan, Outcome, Start, silent};
 
 /// Whether moving the initial gap by 1e-9 m changes neither verdicts nor crash type of the f64 reference, for every lane of a
 /// chunk with outcomes. `None` for drivers outside the registry, which are slow lane by lane.
@@ -23,7 +23,7 @@ fn is_robust(constants: &Constants<f64>, plan: &LanePlan, key: &LaneKey) -> bool
     let case = plan.case(key.block, key.unit, key.variant);
     let gap = plan.headways[key.headway].start::<f64>().gap(case.ego_speed);
     let run = |gap: f64| -> Outcome<f64> {
-        constants.run(plan.models[key.model], &case, plan.tables(), Start::Gap(gap), &mut Silent)
+        constants.run(plan.models[key.model], &case, plan.tables(), Start::Gap(gap), silent)
     };
     let seen = |o: Outcome<f64>| (o.verdicts.0 & 0b111, o.contact);
     let middle = seen(run(gap));

@@ -221,22 +221,15 @@ pub(super) fn exp_minus(x: f64) -> f64 {
     /// Adding this to a number below 2⁵¹ leaves its nearest integer in the lowest bits.
     const ROUND: f64 = 6_755_399_441_055_744.0;
     /// 1/j! for j = 0, 1, …
-    const TAYLOR: [f64; 14] = [
-        1.0,
-        1.0,
-        1.0 / 2.0,
-        1.0 / 6.0,
-        1.0 / 24.0,
-        1.0 / 120.0,
-        1.0 / 720.0,
-        1.0 / 5040.0,
-        1.0 / 40_320.0,
-        1.0 / 362_880.0,
-        1.0 / 3_628_800.0,
-        1.0 / 39_916_800.0,
-        1.0 / 479_001_600.0,
-        1.0 / 6_227_020_800.0,
-    ];
+    const TAYLOR: [f64; 14] = {
+        let (mut series, mut factorial, mut j) = ([1.0; 14], 1.0, 1);
+        while j < 14 {
+            factorial *= j as f64;
+            series[j] = 1.0 / factorial;
+            j += 1;
+        }
+        series
+    };
     let x = if x < 700.0 { x } else { 700.0 };
     // exp(−x) = 2^−k exp(r), |r| ≤ ln 2 / 2.
     let rounded = x * std::f64::consts::LOG2_E + ROUND;

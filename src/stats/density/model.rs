@@ -79,33 +79,10 @@ pub struct DensityModel {
     pub sizes: Sizes,
     /// Events per hour and kilometre, if time or distance is known.
     pub exposure: Option<Exposure>,
-    /// What the file of an earlier version holds beside.
-    pub(super) earlier: Option<EarlierFigures>,
     /// Where it comes from.
     pub provenance: Provenance,
     /// The scenarios in the order of the kernels; empty if the density does not contain them.
     pub scenarios: Vec<Scenario>,
-}
-
-/// How earlier versions compared drawn with unseen scenarios. Nothing uses it, but the file's checksum covers it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct EarlierFigures {
-    metric: f64,
-    metric_deviation: f64,
-    generated_test: f64,
-    generated_train: f64,
-    train_test: f64,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    sinkhorn: Option<f64>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    log_likelihood: Option<f64>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    log_likelihood_deviation: Option<f64>,
-    repetitions: u64,
-    train: u64,
-    test: u64,
-    seed: u64,
 }
 
 /// A density, and the scenarios that it excludes.
@@ -188,7 +165,7 @@ impl DensityModel {
         };
         let exposure = facts.driven.map(|driven| Exposure::new(kept.len() as u64, driven));
         let scenarios = used.into_iter().cloned().collect();
-        let model = DensityModel { space, kde, valid, sizes, exposure, earlier: None, provenance, scenarios };
+        let model = DensityModel { space, kde, valid, sizes, exposure, provenance, scenarios };
         Ok(Fitted { model, left_out })
     }
 
@@ -199,17 +176,7 @@ impl DensityModel {
     pub fn at_bandwidth(&self, value: f64) -> Result<DensityModel> {
         let kde = self.kde.at_bandwidth(value)?;
         let valid = ValidFraction::count(&kde, &self.space, VALID_FRACTION_DRAWS, self.valid.seed)?;
-        let (space, exposure, provenance) = (self.space.clone(), self.exposure, self.provenance.clone());
-        Ok(DensityModel {
-            space,
-            kde,
-            valid,
-            sizes: self.sizes,
-            exposure,
-            earlier: None,
-            provenance,
-            scenarios: vec![],
-        })
+        Ok(DensityModel { kde, valid, scenarios: Vec::new(), ..self.clone() })
     }
 
     /// Kind of scenario.

@@ -13,7 +13,7 @@ use sha2::{Digest, Sha256};
 use super::bandwidth::{Bandwidth, BandwidthLikelihood};
 use super::json_rows::to_readable_json;
 use super::kde::Kde;
-use super::model::{DensityModel, EarlierFigures, Exposure, Provenance};
+use super::model::{DensityModel, Exposure, Provenance};
 use super::parameters::ParameterSpace;
 use super::valid::ValidFraction;
 use lanesweep_model::scenario::parameterization::{
@@ -53,46 +53,25 @@ struct File {
     bandwidth: Bandwidth,
     p_valid: ValidFraction,
     exposure: Option<Exposure>,
-    /// Null, but in files of earlier versions.
-    representativeness: Option<EarlierFigures>,
+    /// Null: earlier versions compared drawn with unseen scenarios.
+    representativeness: (),
     /// Means over the scenarios, because sizes are not parameters.
     sizes: Sizes,
     options: ParameterizationOptions,
     /// The decomposition of a parameterization by SVD.
-    basis: Option<Basis>,
+    basis: Option<SvdBasis>,
     /// One row per scenario, in the order of the parameters.
     kernels: Vec<Vec<f64>>,
     /// One scenario per kernel, with its recorded series; or an empty list.
     scenarios: Vec<Scenario>,
 }
 
-/// The part of a decomposition that the coefficients need.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Basis {
-    /// Scenarios it was fitted on.
-    rows: usize,
-    /// All singular values.
-    singular_values: Vec<f64>,
-    /// p numbers: instants of the series one after the other, then extras.
-    weights: Vec<f64>,
-    /// Mean of the weighted vectors, p numbers.
-    mean: Vec<f64>,
-    /// d rows of p numbers.
-    directions: Vec<Vec<f64>>,
-}
-
 impl File {
     fn of(model: &DensityModel) -> Result<File> {
         let space = &model.space;
         let d = space.dimensions() - usize::from(space.has_thw());
-        let basis = space.reduction().map(|r| Basis {
-            rows: r.basis.rows,
-            singular_values: r.basis.singular_values.clone(),
-            weights: r.basis.weights.clone(),
-            mean: r.basis.mean.clone(),
-            directions: r.basis.directions[..d].to_vec(),
-        });
+        let basis =
+            space.reduction().map(|r| SvdBasis { directions: r.basis.directions[..d].to_vec(), ..r.basis.clone() });
         let mut file = File {
             lanesweep_density: VERSION,
             content_sha256: String::new(),
@@ -105,7 +84,7 @@ impl File {
             bandwidth: *model.kde.bandwidth(),
             p_valid: model.valid.clone(),
             exposure: model.exposure,
-            representativeness: model.earlier,
+            representativeness: (),
             sizes: model.sizes,
             options: space.options().clone(),
             basis,
@@ -127,16 +106,7 @@ impl File {
         let below = |error: Error| inside(place, error);
         // Checked first, because lengths follow from these numbers.
         self.options.validate().map_err(below)?;
-        let reduction = self.basis.map(|b| {
-            let basis = SvdBasis {
-                weights: b.weights,
-                mean: b.mean,
-                singular_values: b.singular_values,
-                directions: b.directions,
-                rows: b.rows,
-            };
-            Reduction::from_parts(self.category, basis, &self.options)
-        });
+        let reduction = self.basis.map(|basis| Reduction::from_parts(self.category, basis, &self.options));
         let reduction = reduction.transpose().map_err(below)?;
         let Some(id) = Parameterization::find(self.category, &self.parameterization) else {
             let problem = format!("there is no `{}` of category {}", self.parameterization, self.category.label());
@@ -218,7 +188,6 @@ impl File {
             valid: share,
             sizes: self.sizes,
             exposure: self.exposure.map(|of| Exposure::new(of.events, of.driven)),
-            earlier: self.representativeness,
             provenance: self.provenance,
             scenarios: self.scenarios,
         })
@@ -274,18 +243,9 @@ fn check_version(text: &[u8], place: &Place) -> Result<()> {
     #[derive(Deserialize)]
     struct Version {
         lanesweep_density: Option<serde_json::Value>,
-        /// Densities of other kinds, which earlier versions fitted.
-        mixture: Option<Other>,
     }
-    #[derive(Deserialize)]
-    struct Other {
-        kind: String,
-    }
+
     let version: Version = serde_json::from_slice(text).map_err(|e| broken(place, &e))?;
-    if let Some(Other { kind }) = version.mixture {
-        let problem = format!("a density of kind `{kind}`, but this program reads kernel densities");
-        return Err(Error::input(place.clone().column("mixture"), problem, "fit again"));
-    }
     match version.lanesweep_density {
         Some(value) if value.as_u64() == Some(VERSION) => Ok(()),
         Some(value) => Err(Error::input(

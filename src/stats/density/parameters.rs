@@ -105,7 +105,6 @@ impl ParameterSpace {
         with_thw: bool,
     ) -> Result<ParameterSpace> {
         options.validate()?;
-        id.validate()?;
         let place = || Place::item(id.name());
         let variables = id.variables();
         if id.category == Category::CutIn
@@ -185,18 +184,6 @@ impl ParameterSpace {
     /// The headway of a point, s; `None` without a headway dimension.
     pub fn thw_s(&self, point: &[f64]) -> Option<f64> {
         self.has_thw.then(|| point[point.len() - 1])
-    }
-
-    /// Index of the parameter with this name.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] with the valid names and the most similar one.
-    pub fn index_of(&self, name: &str) -> Result<usize> {
-        if let Some(index) = self.parameters.iter().position(|p| p.name == name) {
-            return Ok(index);
-        }
-        let names = self.parameters.iter().map(|p| p.name.as_str());
-        Err(Error::unknown(Place::item(self.id.name()), "parameter", name, names, ""))
     }
 
     /// The parameters with the bounds of a draw.

@@ -3,14 +3,12 @@
 //! If one draw is used in several runs (for example headways), the draws are independent, but the runs of a draw are
 //! not.
 
-use serde::{Deserialize, Serialize};
-
 use super::interval::{rule_of_three, wilson};
 use super::stop::StopReason;
 use super::summary::Estimate;
 
 /// Counts of a sample.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy)]
 pub struct Counts {
     /// Number of valid draws; all of them are evaluated.
     pub runs: u64,
@@ -18,26 +16,11 @@ pub struct Counts {
     pub failures: u64,
     /// Number of indices without a valid point.
     pub voids: u64,
-    /// Number of attempts at valid points.
-    pub tries: u64,
-}
-
-impl std::ops::Add for Counts {
-    type Output = Counts;
-
-    fn add(self, other: Counts) -> Counts {
-        Counts {
-            runs: self.runs + other.runs,
-            failures: self.failures + other.failures,
-            voids: self.voids + other.voids,
-            tries: self.tries + other.tries,
-        }
-    }
 }
 
 /// The estimate from counts, with Wilson's interval, or the rule of three without failures.
 pub fn from_counts(counts: &Counts, level: f64, stopped: StopReason) -> Estimate {
-    let Counts { runs, failures, voids, .. } = *counts;
+    let Counts { runs, failures, voids } = *counts;
     let probability = if runs > 0 { failures as f64 / runs as f64 } else { 0.0 };
     let interval = match failures {
         0 => rule_of_three(runs, level),

@@ -118,13 +118,6 @@ impl RatioVerdict {
     }
 }
 
-impl Ratio {
-    /// Whether the rates are equal within the margin.
-    pub fn agrees(&self) -> bool {
-        self.verdict == RatioVerdict::Agrees
-    }
-}
-
 /// Method of a ratio's interval.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -158,18 +151,21 @@ pub struct Ratio {
 }
 
 impl Ratio {
-    /// From the standard deviation of the logarithm.
-    fn of_logarithm(ratio: f64, sigma: f64, freedom: f64, level: f64) -> Ratio {
+    /// Whether the rates are equal within the margin.
+    pub fn agrees(&self) -> bool {
+        self.verdict == RatioVerdict::Agrees
+    }
+
+    /// A paired interval may lie within the margin; a separate one does not tell agreement.
+    fn new(ratio: f64, [low, high]: [f64; 2], method: RatioMethod) -> Ratio {
         let finite = |v: f64| v.is_finite().then_some(v);
-        let factor = libm::exp(student_quantile(0.5 + 0.5 * level, freedom) * sigma);
-        let (low, high) = (ratio / factor, ratio * factor);
-        let verdict = match () {
-            () if low >= 1.0 / MARGIN && high <= MARGIN => RatioVerdict::Agrees,
-            () if low > 1.0 => RatioVerdict::TooHigh,
-            () if high < 1.0 => RatioVerdict::TooLow,
-            () => RatioVerdict::Undecided,
+        let verdict = match method {
+            RatioMethod::Paired if low >= 1.0 / MARGIN && high <= MARGIN => RatioVerdict::Agrees,
+            _ if low > 1.0 => RatioVerdict::TooHigh,
+            _ if high < 1.0 => RatioVerdict::TooLow,
+            _ => RatioVerdict::Undecided,
         };
-        Ratio { ratio: Some(ratio), low: finite(low), high: finite(high), method: RatioMethod::Paired, verdict }
+        Ratio { ratio: finite(ratio), low: finite(low), high: finite(high), method, verdict }
     }
 }
 
@@ -185,26 +181,18 @@ impl Ratio {
 /// With too few failing clusters the interval is [P_low/S_high, P_high/S_low] of [`cluster_rate`]. If it excludes 1, it
 /// still decides; otherwise the verdict is undecided, not agreement.
 pub fn paired_ratio(numerator: Clusters, denominator: Clusters, level: f64) -> Ratio {
-    let finite = |v: f64| v.is_finite().then_some(v);
     let (p, s) = (numerator.rate(), denominator.rate());
-    let side = |c: Clusters| c.failing() >= MIN_FAILING;
-    if !(side(numerator) && side(denominator)) {
+    let failing = numerator.failing().min(denominator.failing());
+    if failing < MIN_FAILING {
         let (above, below) = (cluster_rate(numerator, level).interval, cluster_rate(denominator, level).interval);
-        let (low, high) = (above.low / below.high, above.high / below.low);
-        let verdict = match () {
-            () if low > 1.0 => RatioVerdict::TooHigh,
-            () if high < 1.0 => RatioVerdict::TooLow,
-            () => RatioVerdict::Undecided,
-        };
-        let method = RatioMethod::Separate;
-        return Ratio { ratio: finite(p / s), low: finite(low), high: finite(high), method, verdict };
+        return Ratio::new(p / s, [above.low / below.high, above.high / below.low], RatioMethod::Separate);
     }
     let n = numerator.runs.len() as f64;
     let pairs = numerator.influences().zip(denominator.influences());
     let squares: f64 = pairs.map(|(z, y)| (z / p - y / s) * (z / p - y / s)).sum();
     let sigma = (n / (n - 1.0) * squares).sqrt();
-    let freedom = numerator.failing().min(denominator.failing()) as f64 - 1.0;
-    Ratio::of_logarithm(p / s, sigma, freedom, level)
+    let factor = libm::exp(student_quantile(0.5 + 0.5 * level, failing as f64 - 1.0) * sigma);
+    Ratio::new(p / s, [p / s / factor, p / s * factor], RatioMethod::Paired)
 }
 
 #[cfg(test)]

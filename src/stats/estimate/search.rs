@@ -7,14 +7,12 @@
 //! density take their place. A proposal is accepted if a fresh sample of it shows no failure of large weight, and crude
 //! draws of the density show none where it is thin.
 
-use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use super::evaluated_points::{Pool, effective_size};
 use super::limit_state::{Density, LimitState, purpose};
 use super::proposal_mixtures::{designs, fitted};
 use crate::density::Mixture;
-use crate::density::moments::{factor_or_diagonal, moments};
 use lanesweep_random::Stream;
 use lanesweep_support::{Error, Place, Result};
 
@@ -133,12 +131,8 @@ pub struct SearchRun {
 
 impl SearchRun {
     /// The proposal, or the density in its place.
-    ///
-    /// # Errors
-    /// [`Error::Internal`] for a density without kernels.
-    pub fn proposal_or(&self, nominal: &dyn Density) -> Result<Mixture> {
-        let none = || Error::Internal("a density without kernels cannot replace a proposal".to_owned());
-        self.proposal.clone().or_else(|| nominal.mixture()).ok_or_else(none)
+    pub fn proposal_or(&self, nominal: &dyn Density) -> Mixture {
+        self.proposal.clone().unwrap_or_else(|| nominal.mixture())
     }
 
     /// Whether there is a proposal.
@@ -211,7 +205,7 @@ impl<'a> Searching<'a> {
     ) -> Result<Searching<'a>> {
         let mut pool = Pool::new(nominal, limit_state);
         let kernels = nominal.mixture();
-        let count = kernels.as_ref().map_or(1, |kernels| kernels.weights().len()) as u64;
+        let count = kernels.weights().len() as u64;
         let first = options.batch.max((4 * count).min(MAX_FIRST));
         let stream = |at: u32| Stream { seed, purpose: purpose::SEARCH + at };
         pool.add_nominal(stream(0), first)?;
@@ -219,16 +213,6 @@ impl<'a> Searching<'a> {
             let help = "check the bounds of the parameters: they must leave something of the density";
             return Err(Error::usage(Place::item("search"), "no draw of the density is valid", help));
         }
-        let kernels = match kernels {
-            Some(kernels) => kernels,
-            None => {
-                // Without kernels, one Gaussian has the density's spread.
-                let d = nominal.dimensions();
-                let (mean, covariance) = moments(pool.points.iter().map(|p| (p.as_slice(), 1.0)), d);
-                let factor: DMatrix<f64> = factor_or_diagonal(covariance);
-                Mixture::new(vec![1.0], vec![mean.as_slice().to_vec()], vec![factor], vec![0])?
-            }
-        };
         for (at, variance) in (1..).zip(WIDER) {
             pool.add_source(kernels.scaled(variance)?, stream(at), first / 2)?;
         }

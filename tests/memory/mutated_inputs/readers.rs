@@ -115,7 +115,7 @@ fn assert_whole(recording: &Recording) {
 
 /// The first lanes of a plan, with one headway.
 fn run_some(plan: &LanePlan, units: u64) -> Result<()> {
-    let mut session = CpuBackend::<f64>::reference().prepare(plan)?;
+    let mut session = CpuBackend::reference().prepare(plan)?;
     session.run(0..plan.unit_count().min(units), Wanted::Outcomes).map(drop)
 }
 

@@ -152,7 +152,7 @@ impl Seeds {
         let file_of = |density: &DensityModel| written(|path| write_density(path, density).unwrap());
         let others = [fit(Category::Lvd, "ii", 6), fit(Category::Lvd, "iii", 8), fit(Category::CutOut, "b", 10)];
         let plan = small_plan(&density, &profile).unwrap();
-        let chunk = CpuBackend::<f64>::reference().prepare(&plan).unwrap().run(PART_UNITS, Wanted::Outcomes).unwrap();
+        let chunk = CpuBackend::reference().prepare(&plan).unwrap().run(PART_UNITS, Wanted::Outcomes).unwrap();
         let tally = SampleTally::of_chunk(&plan, &chunk).unwrap();
         let journal = written(|path| {
             let (mut journal, _) = Journal::open(path, "00", PART_UNITS).unwrap();

@@ -62,13 +62,6 @@ impl Values {
 }
 
 impl Kinematic {
-    /// Whether scenarios of the category can have these features.
-    pub(super) fn exists_in(self, category: Category) -> bool {
-        let is_lvd = category == Category::Lvd;
-        let lacking = if is_lvd { SpeedProfile::Constant } else { SpeedProfile::Sinusoidal };
-        is_lvd == (self.lane_change == LaneChange::None) && self.speed != lacking
-    }
-
     /// The variables in the order of a point's numbers.
     pub(super) fn variables(self, category: Category) -> Vec<Variable> {
         let decelerates = category == Category::Lvd;

@@ -21,12 +21,13 @@ pub use parameter::{MAX_DURATION_S, MIN_DURATION_S, Parameter, Variable};
 pub use reduction::{ReducedScenario, ReducedSeries, Reduction};
 pub use series::steps_of;
 pub use series::{TimeGrid, recorded_case};
+pub(crate) use sizes::default_lane_width_m;
 pub use sizes::vehicle_ahead;
 pub use sizes::{Sizes, VehicleSize};
 pub use svd::{SvdBasis, fit_svd};
 
 use crate::scenario::{Case, Category, Scenario};
-use lanesweep_support::{Error, Place, Result};
+use lanesweep_support::{Error, Result};
 
 /// How a parameterization represents a scenario.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -169,19 +170,6 @@ impl Parameterization {
         self.features().is_none_or(|features| features.speed == SpeedProfile::Sinusoidal)
     }
 
-    /// Refuses features that the category does not have.
-    ///
-    /// # Errors
-    /// [`Error::Usage`].
-    pub fn validate(&self) -> Result<()> {
-        if self.features().is_none_or(|features| features.exists_in(self.category)) {
-            return Ok(());
-        }
-        let problem = format!("{} has no {}", self.category.label(), self.description());
-        let help = "an LVD changes its speed and stays in its lane; a sinusoid belongs to an LVD";
-        Err(Error::usage(Place::item(self.name()), problem, help))
-    }
-
     /// Encodes a mined scenario as a point; an SVD parameterization needs its decomposition.
     ///
     /// # Errors
@@ -213,7 +201,6 @@ impl Parameterization {
         options: &ParameterizationOptions,
         reduction: Option<&Reduction>,
     ) -> Result<Case> {
-        self.validate()?;
         let expected = self.coefficients().unwrap_or_else(|| self.variables().len());
         if point.len() != expected {
             return Err(Error::Internal(format!("{}: {} numbers, expected {expected}", self.name(), point.len())));
@@ -244,7 +231,6 @@ impl Parameterization {
     }
 
     fn check_scenario(&self, scenario: &Scenario) -> Result<()> {
-        self.validate()?;
         if scenario.category == self.category {
             return Ok(());
         }

@@ -31,7 +31,7 @@ pub struct Sizes {
     pub lane_width_m: f64,
 }
 
-fn default_lane_width_m() -> f64 {
+pub(crate) fn default_lane_width_m() -> f64 {
     LANE_WIDTH_M
 }
 

@@ -10,20 +10,20 @@ use super::options::{SeriesScale, SvdLateral};
 use lanesweep_support::vector_state::clear_upper_halves;
 use lanesweep_support::{Error, Place, Result};
 
-/// A fitted decomposition.
+/// A fitted decomposition, as density files hold it.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SvdBasis {
+    /// Number of rows in the fit.
+    pub rows: usize,
+    /// Singular values, in descending order.
+    pub singular_values: Vec<f64>,
     /// Weight of each column of z; > 0.
     pub weights: Vec<f64>,
     /// Mean of the weighted vectors.
     pub mean: Vec<f64>,
-    /// Singular values, in descending order.
-    pub singular_values: Vec<f64>,
-    /// Right singular vectors, one per singular value, each as long as z.
+    /// Right singular vectors, the first singular values' or all, each as long as z.
     pub directions: Vec<Vec<f64>>,
-    /// Number of rows in the fit.
-    pub rows: usize,
 }
 
 /// Fits on `rows`, each a vector of `series` × `instants` values followed by extras. `lateral` is the sign of the first
