@@ -8,9 +8,7 @@ use serde_json::json;
 use super::configured::Configured;
 use super::shell::{Completions, Man};
 use super::{Exit, Output, console};
-use crate::settings::{
-    Assignment, DEFAULT_FILE, DEFAULT_FILE_NAME, Layers, Setting, profile_schema, settings_schema, text_of,
-};
+use crate::settings::{DEFAULT_FILE, DEFAULT_FILE_NAME, Layers, Setting, profile_schema, settings_schema, text_of};
 use lanesweep_model::profile::Profile;
 use lanesweep_report::records::document;
 use lanesweep_support::files::write_atomically;
@@ -148,9 +146,9 @@ impl Show {
         // Only the profile can check its own time step.
         configured.profile()?;
         configured.backend()?;
-        let shown: Vec<Setting> = match self.changed {
+        let shown: Vec<&Setting> = match self.changed {
             true => configured.layers.given().collect(),
-            false => configured.layers.list().collect(),
+            false => configured.layers.0.iter().collect(),
         };
         let text = match self.format {
             ShowFormat::Text => table(&shown),
@@ -164,7 +162,8 @@ impl Show {
 
 impl Check {
     fn run(&self) -> Result<Output> {
-        let layers = Layers::read(&[Assignment::File(self.file.clone())], None)?;
+        let mut layers = Layers::defaults();
+        layers.read_file(&self.file)?;
         layers.settings()?;
         let count = layers.given().count();
         let text = format!("{}: {count} keys set, all of them known and in range\n", self.file.display());
@@ -185,20 +184,20 @@ impl Schema {
 }
 
 fn value(setting: &Setting) -> String {
-    setting.value.map_or("-".to_owned(), text_of)
+    setting.value.as_ref().map_or("-".to_owned(), text_of)
 }
 
-fn table(shown: &[Setting]) -> String {
-    let width = |of: &dyn Fn(&Setting) -> usize| shown.iter().map(of).max().unwrap_or(0);
+fn table(shown: &[&Setting]) -> String {
+    let width = |of: &dyn Fn(&&Setting) -> usize| shown.iter().map(of).max().unwrap_or(0);
     let keys = width(&|setting| setting.key.name.len());
     let values = width(&|setting| value(setting).len());
     let line =
-        |setting: &Setting| format!("{:keys$}  {:values$}  {}\n", setting.key.name, value(setting), setting.origin);
+        |setting: &&Setting| format!("{:keys$}  {:values$}  {}\n", setting.key.name, value(setting), setting.origin);
     shown.iter().map(line).collect()
 }
 
-fn json_list(shown: &[Setting]) -> Result<String> {
-    let object = |setting: &Setting| {
+fn json_list(shown: &[&Setting]) -> Result<String> {
+    let object = |setting: &&Setting| {
         json!({
             "key": setting.key.name,
             "value": setting.value,
@@ -209,11 +208,11 @@ fn json_list(shown: &[Setting]) -> Result<String> {
     document(&shown.iter().map(object).collect::<Vec<_>>())
 }
 
-fn toml_file(shown: &[Setting]) -> String {
+fn toml_file(shown: &[&Setting]) -> String {
     let (mut text, mut table) = (String::new(), "");
     for setting in shown {
         let (of, name) = setting.key.name.rsplit_once('.').unwrap_or(("", &setting.key.name));
-        let Some(value) = setting.value else { continue };
+        let Some(value) = &setting.value else { continue };
         if of != table {
             let gap = if text.is_empty() { "" } else { "\n" };
             text += &format!("{gap}[{of}]\n");

@@ -1,7 +1,6 @@
 //! From the command line to a configuration: which flag sets which key. Verbs read the values of these flags from the
 //! settings. `--backend` and `--device` determine the opened backend.
 
-use std::collections::BTreeSet;
 use std::time::Instant;
 
 use clap::builder::{PossibleValue, PossibleValuesParser};
@@ -13,13 +12,10 @@ use super::console::{self, Total, Verbosity};
 use super::help::RUN;
 use super::signals::CANCEL;
 use super::{COMMIT, Cli, Verb};
-use crate::settings::{
-    Assignment, FILE_VARIABLE, Key, KeyFlag, KeyKind, Layers, Origin, Setting, Settings, keys_in_order,
-};
+use crate::settings::{FILE_VARIABLE, Key, KeyFlag, KeyKind, Layers, Origin, Setting, Settings, keys_in_order};
 use lanesweep_engine::{BackendChoice, DeviceName, Executor, OpenBackend};
 use lanesweep_model::profile::Profile;
 use lanesweep_report::host::{Host, SettingRecord};
-use lanesweep_support::plain_text::nearest;
 use lanesweep_support::{Error, Place, Result, option};
 
 /// The configuration of a run, and what every verb needs besides.
@@ -163,7 +159,7 @@ impl Configured {
         let unread = |e: clap::Error| Error::Internal(format!("the command line cannot be read: {e}"));
         let mut cli = Cli::from_arg_matches(matches).map_err(unread)?;
         let (path, typed, last) = verb_of(matches);
-        let mut layers = if reads_configuration(&path) { layers(&typed)? } else { Layers::defaults() };
+        let mut layers = if reads_configuration(&path) { Layers::read(&typed)? } else { Layers::defaults() };
         let verb = path.last().unwrap_or(&"");
         let keys = Key::all();
         for (key, KeyFlag { name, .. }) in flags_of(&keys, "lanesweep").chain(flags_of(&keys, verb)) {
@@ -210,7 +206,7 @@ impl Configured {
 
     /// Adds the file or assignment that sets the key to an error about an option.
     fn at_origin(&self, key: &str, option: &'static str, error: Error) -> Error {
-        let origin = self.layers.get(key).map(|setting| setting.origin);
+        let origin = self.layers.get(key).map(|setting| &setting.origin);
         match (error, origin) {
             (error, None | Some(Origin::Default | Origin::Flag(_))) => error,
             (Error::Usage { place, problem, help }, Some(origin)) if place.option == Some(option) => {
@@ -227,12 +223,12 @@ impl Configured {
 
     /// All settings, for the record of a run; without those that a plan file decides, if one was given.
     pub(super) fn record(&self, has_plan: bool) -> Vec<SettingRecord> {
-        let record = |setting: Setting| SettingRecord {
+        let record = |setting: &Setting| SettingRecord {
             key: setting.key.name.clone(),
-            value: setting.value.cloned().unwrap_or_default(),
+            value: setting.value.clone().unwrap_or_default(),
             source: setting.origin.to_string(),
         };
-        self.layers.list().filter(|setting| !(has_plan && is_of_plan(&setting.key.name))).map(record).collect()
+        self.layers.0.iter().filter(|setting| !(has_plan && is_of_plan(&setting.key.name))).map(record).collect()
     }
 
     /// The record of the host, at the end of the run.
@@ -299,7 +295,7 @@ impl Configured {
             Origin::File { .. } => are_files_refused,
             _ => false,
         };
-        match self.layers.given().find(|setting| is_refused(setting.origin) && is_of_plan(&setting.key.name)) {
+        match self.layers.given().find(|setting| is_refused(&setting.origin) && is_of_plan(&setting.key.name)) {
             None => Ok(()),
             Some(Setting { key, origin, .. }) => {
                 Err(Error::usage(origin.place(&key.name), format!("`{}` {why}", key.name), help))
@@ -308,59 +304,16 @@ impl Configured {
     }
 }
 
-/// The layers of `--config` and of the variable that names a file.
-///
-/// # Errors
-/// As [`Layers::read`]; [`Error::Usage`] for a text that is neither a file nor an assignment.
-fn layers(typed: &[Assignment]) -> Result<Layers> {
-    // A missing file is named by the system's error if its name says that a file is meant.
-    let is_neither = |one: &&Assignment| match one {
-        Assignment::File(path) => !path.exists() && path.extension().is_none_or(|ending| ending != "toml"),
-        Assignment::Value(_) => false,
-    };
-    if let Some(Assignment::File(path)) = typed.iter().find(is_neither) {
-        let problem = format!("`{}` is neither KEY=VALUE nor an existing file", path.display());
-        let help = "write a key with its value, such as run.dt_s=0.05, or the path of a TOML file";
-        return Err(Error::usage(Place::option("config"), problem, help));
-    }
-    check_variables(&Key::all())?;
-    let file = std::env::var_os(FILE_VARIABLE).filter(|file| !file.is_empty());
-    if let Some(file) = file.as_ref().filter(|_| !typed.iter().any(|one| matches!(one, Assignment::File(_)))) {
-        tracing::info!("configuration of {FILE_VARIABLE}: {}", file.display());
-    }
-    Layers::read(typed, file.as_deref())
-}
-
-/// Looks for variables that would be ignored silently: those of keys, which earlier versions read, and misspellings of
-/// [`FILE_VARIABLE`].
-///
-/// # Errors
-/// [`Error::Usage`] for a misspelling.
-fn check_variables(keys: &[Key]) -> Result<()> {
-    let names: BTreeSet<String> = std::env::vars_os().filter_map(|(name, _)| name.into_string().ok()).collect();
-    for name in names.iter().filter(|name| *name != FILE_VARIABLE) {
-        let Some(rest) = name.strip_prefix("LANESWEEP_") else { continue };
-        if let Some(key) = keys.iter().find(|key| key.name.replace('.', "_").eq_ignore_ascii_case(rest)) {
-            let config = option(&format!("config = {}=VALUE", key.name));
-            tracing::warn!("the variable {name} is not read: write {config}, or a file");
-        } else if nearest(rest, FILE_VARIABLE.strip_prefix("LANESWEEP_"), 0.85).is_some() {
-            let help = format!("did you mean `{FILE_VARIABLE}`, which names a configuration file?");
-            return Err(Error::usage(Place::item(name.clone()), "there is no such variable", help));
-        }
-    }
-    Ok(())
-}
-
 /// Whether a verb reads the configuration.
 fn reads_configuration(path: &[&str]) -> bool {
     !matches!(path, ["config", "init" | "schema" | "check" | "completions" | "man"])
 }
 
 /// The verb and its subverb, the values of `--config` before and after them, and the matches of the last one.
-fn verb_of(matches: &ArgMatches) -> (Vec<&str>, Vec<Assignment>, &ArgMatches) {
+fn verb_of(matches: &ArgMatches) -> (Vec<&str>, Vec<&str>, &ArgMatches) {
     let (mut path, mut typed, mut last) = (Vec::new(), Vec::new(), matches);
     loop {
-        typed.extend(last.get_many::<String>("config").into_iter().flatten().map(|text| Assignment::of(text)));
+        typed.extend(last.get_many::<String>("config").into_iter().flatten().map(String::as_str));
         let Some((name, inner)) = last.subcommand() else { return (path, typed, last) };
         path.push(name);
         last = inner;
