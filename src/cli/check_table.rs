@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::case_flags::{CaseFlags, GivenCase, GivenCases};
 use super::configured::Configured;
-use super::console::{self, Total};
+use super::console;
 use super::format::FormatFlag;
 use super::signals::CANCEL;
 use super::source::complain_of;
@@ -50,7 +50,7 @@ impl CheckedTable<'_> {
         let mut doubts = Doubts::new(self.implausible);
         let opened = self.is_nominal.then(|| configured.open()).transpose()?;
         let (mut cases, mut broken, mut is_end) = (Vec::new(), Vec::new(), false);
-        configured.with_bar(Total::AtMost(u64::MAX), "judging", |bar| {
+        configured.with_bar(u64::MAX, "judging", |bar| {
             while !is_end {
                 let mut rows: Vec<Row> = Vec::new();
                 while rows.len() < ROWS[usize::from(self.is_nominal)] && !is_end {

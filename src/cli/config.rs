@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::configured::Configured;
 use super::shell::{Completions, Man};
-use super::{Exit, Output, console};
+use super::{Output, console};
 use crate::settings::{DEFAULT_FILE, DEFAULT_FILE_NAME, Layers, Setting, profile_schema, settings_schema, text_of};
 use lanesweep_model::profile::Profile;
 use lanesweep_report::records::document;
@@ -117,8 +117,7 @@ impl Config {
 impl Init {
     fn run(&self) -> Result<Output> {
         if self.file == Path::new("-") {
-            console::print(DEFAULT_FILE)?;
-            return Ok(Exit::Ok.into());
+            return console::answer(DEFAULT_FILE);
         }
         if self.file.exists() {
             let help = "choose another name, or move it away; `lanesweep config init -` prints the file";
@@ -135,9 +134,7 @@ impl Init {
         let (flag, text) = profile.map_or(("config", DEFAULT_FILE), |(_, text)| ("profile", text));
         write_atomically(&self.file, text.as_bytes())?;
         let file = self.file.display().to_string();
-        let text = format!("{file} written; use it with --{flag} {}\n", quoted_word(&file));
-        console::print(&text)?;
-        Ok(Exit::Ok.into())
+        console::answer(&format!("{file} written; use it with --{flag} {}\n", quoted_word(&file)))
     }
 }
 
@@ -150,13 +147,11 @@ impl Show {
             true => configured.layers.given().collect(),
             false => configured.layers.0.iter().collect(),
         };
-        let text = match self.format {
+        console::answer(&match self.format {
             ShowFormat::Text => table(&shown),
             ShowFormat::Json => json_list(&shown)?,
             ShowFormat::Toml => toml_file(&shown),
-        };
-        console::print(&text)?;
-        Ok(Exit::Ok.into())
+        })
     }
 }
 
@@ -166,9 +161,7 @@ impl Check {
         layers.read_file(&self.file)?;
         layers.settings()?;
         let count = layers.given().count();
-        let text = format!("{}: {count} keys set, all of them known and in range\n", self.file.display());
-        console::print(&text)?;
-        Ok(Exit::Ok.into())
+        console::answer(&format!("{}: {count} keys set, all of them known and in range\n", self.file.display()))
     }
 }
 
@@ -178,8 +171,7 @@ impl Schema {
             SchemaOf::Config => settings_schema(),
             SchemaOf::Profile => profile_schema()?,
         };
-        console::print(&format!("{schema:#}\n"))?;
-        Ok(Exit::Ok.into())
+        console::answer(&format!("{schema:#}\n"))
     }
 }
 

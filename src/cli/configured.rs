@@ -7,8 +7,9 @@ use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, FromArgMatches};
 use indicatif::ProgressBar;
+use tracing::Level;
 
-use super::console::{self, Total, Verbosity};
+use super::console;
 use super::help::RUN;
 use super::signals::CANCEL;
 use super::{COMMIT, Cli, Verb};
@@ -28,7 +29,7 @@ pub(super) struct Configured {
     /// The command line or call, for repeating the run.
     pub command: String,
     /// What stderr shows.
-    pub verbosity: Verbosity,
+    pub level: Level,
     started: Instant,
 }
 
@@ -169,21 +170,21 @@ impl Configured {
                 layers.flag(&key.name, &option(name), &word.to_string_lossy())?;
             }
         }
-        let configured = Configured::combined(layers, command, cli.common.verbosity())?;
+        let configured = Configured::combined(layers, command, cli.common.level())?;
         if let Verb::Sample(sample) = &mut cli.verb {
             sample.settings = configured.settings.sample.clone();
         }
         Ok((cli, configured))
     }
 
-    fn combined(layers: Layers, command: String, verbosity: Verbosity) -> Result<Configured> {
+    fn combined(layers: Layers, command: String, level: Level) -> Result<Configured> {
         let mut settings = layers.settings()?;
         let layer = |key: &str| layers.get(key).map_or(0, |setting| setting.origin.layer());
         // A backend without devices overrides a device of an earlier source.
         if settings.run.backend == BackendChoice::Cpu && layer("run.backend") > layer("run.device") {
             settings.run.device = None;
         }
-        Ok(Configured { settings, layers, command, verbosity, started: Instant::now() })
+        Ok(Configured { settings, layers, command, level, started: Instant::now() })
     }
 
     /// The profile with its time step.
@@ -242,11 +243,11 @@ impl Configured {
     /// Those of the work.
     pub(super) fn with_bar<T>(
         &self,
-        units: Total,
+        units: u64,
         what: &str,
         work: impl FnOnce(&ProgressBar) -> Result<T>,
     ) -> Result<T> {
-        let bar = console::progress(self.verbosity, units, what);
+        let bar = console::progress(self.level, units, what);
         let done = work(&bar);
         bar.finish_and_clear();
         done
@@ -258,7 +259,7 @@ impl Configured {
     /// Those of the work.
     pub(super) fn with_progress<T>(
         &self,
-        units: Total,
+        units: u64,
         what: &str,
         executor: &Executor,
         work: impl FnOnce(&Executor) -> Result<T>,

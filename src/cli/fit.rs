@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::configured::Configured;
-use super::console::{self, Total};
+use super::console;
 use super::format::FormatFlag;
 use super::lists;
 use super::source::SourceFlags;
@@ -76,7 +76,7 @@ impl Fit {
         let folder = (!self.is_single()).then(|| RunFolder::open(&self.out, None)).transpose()?;
         let mut fitted: Vec<(PathBuf, DensityModel)> = Vec::new();
         let (mut failed, mut complete) = (Vec::new(), collection.problems.is_empty());
-        configured.with_bar(Total::Exact(ids.len() as u64), "fitting", |bar| {
+        configured.with_bar(ids.len() as u64, "fitting", |bar| {
             for (id, file) in ids.iter().zip(files) {
                 let result = DensityModel::fit(*id, &collection.scenarios, &facts, &options);
                 bar.inc(1);

@@ -88,9 +88,6 @@ const SEARCH_CRUDE: u64 = 20_000;
 /// Maximum number of draws of importance sampling after a search, if none is given.
 const MAX_DRAWS: u64 = 10_000_000;
 
-/// Maximum number of samples of a run that can be split and resumed.
-const MAX_SPLIT: u64 = (1 << 48) - 1;
-
 /// The error for a flag that only crude Monte Carlo has.
 pub(super) fn only_crude(flag: &'static str) -> Error {
     let problem = "this belongs to crude Monte Carlo";
@@ -105,14 +102,8 @@ impl Sample {
         if self.rows.is_some() && !is_crude {
             return Err(only_crude("rows"));
         }
-        if settings.estimator == EstimatorKind::Is {
-            if let Some(samples) = settings.samples.filter(|samples| *samples > MAX_SPLIT) {
-                let help = format!("give at least 1 and at most {MAX_SPLIT}");
-                return Err(Error::usage(Place::option("samples"), format!("{samples} is out of range"), help));
-            }
-            if settings.time_limit_s.is_some() {
-                return Err(only_crude("time_limit"));
-            }
+        if settings.estimator == EstimatorKind::Is && settings.time_limit_s.is_some() {
+            return Err(only_crude("time_limit"));
         }
         let is_split = self.shards.is_part() || self.shards.plan_only;
         if is_split && is_crude && (settings.half_width.is_some() || settings.time_limit_s.is_some()) {

@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use super::configured::Configured;
-use super::console::Total;
 use super::sample::Sample;
 use super::sample_options::{guard, only_crude};
 use super::signals::CANCEL;
@@ -99,7 +98,7 @@ impl Sample {
         let is_split = self.shards.plan_only || self.shards.is_part();
         let sample = match sample.kind {
             SampleKind::Search(search) => {
-                let units = Total::AtMost(warn_of_long(&sample, &search));
+                let units = warn_of_long(&sample, &search);
                 // The search is kept in the folder, so it needs the folder's lock too.
                 let _folder = (!is_split).then(|| RunFolder::open(&self.out, sampling::ESTIMATE_RECORD)).transpose()?;
                 let found = configured.with_progress(units, "searching", executor, |executor| {
@@ -149,15 +148,11 @@ impl Sample {
         let rows = self.rows.as_deref().filter(|_| !is_empty);
         let mut table = rows.map(|path| lanes::sampled_table(path, sample)).transpose()?;
         let failures = self.failures.as_deref().map(|path| lanes::sampled_table(path, sample)).transpose()?;
-        let units = match sample.options.stop.is_fixed() {
-            true => Total::Exact(missing),
-            false => Total::AtMost(missing),
-        };
         let mut write_chunk = table
             .as_mut()
             .map(|table| |plan: &LanePlan, chunk: &Chunk| lanes::write_sampled_chunk(table, sample, plan, chunk));
         let each = write_chunk.as_mut().map(|write| write as &mut EachChunk);
-        configured.with_progress(units, "sampling", executor, |executor| run.compute(executor, each))?;
+        configured.with_progress(missing, "sampling", executor, |executor| run.compute(executor, each))?;
         let rows = table.map(TableWriter::stage).transpose()?;
         if self.shards.is_part() {
             rows.map_or(Ok(()), StagedFile::publish)?;
@@ -168,7 +163,7 @@ impl Sample {
         if let Some(half_width) = self.settings.half_width.filter(|_| self.is_refined()) {
             tracing::info!("importance sampling of what is rare");
             let search = self.search(&sample.options.models, &sample.options.headways);
-            let units = Total::AtMost(warn_of_long(sample, &search));
+            let units = warn_of_long(sample, &search);
             result = configured.with_progress(units, "searching", executor, |executor| {
                 sample.refined(result, &search, half_width, executor)
             })?;
@@ -209,7 +204,7 @@ pub(super) fn list_failures(
     };
     let cpu = CpuBackend::lane_arithmetic();
     let executor = Executor::new(&cpu).with_cancel(CANCEL.clone());
-    configured.with_progress(Total::AtMost(samples), "failing lanes", &executor, |executor| {
+    configured.with_progress(samples, "failing lanes", &executor, |executor| {
         let limit = configured.settings.sample.failures_limit;
         let each = &mut |lane: &FailingLane| lanes::write_failing_lane(&mut table, sample, lane);
         sample.failing_lanes(result, limit, executor, each)

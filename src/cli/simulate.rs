@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::case_flags::{CaseFlags, GivenCase, from_table, from_toml, time_s};
 use super::configured::Configured;
-use super::console::{self, Verbosity};
+use super::console;
 use super::format::FormatFlag;
 use super::source::{PlausibilityFlag, scenarios_of};
 use super::xosc::{self, XoscFlags};
@@ -90,7 +90,7 @@ impl Simulate {
         self.xosc.write(&played)?;
         let exit = if incomplete { Exit::Incomplete } else { Exit::Ok };
         let output = self.format.output(exit, || report.csv(), || report.json())?;
-        if configured.verbosity != Verbosity::Quiet {
+        if configured.level != tracing::Level::ERROR {
             console::say(&report.text());
         }
         Ok(output.with_tables(|| report.tables()))

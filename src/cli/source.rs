@@ -6,7 +6,7 @@ use clap::Args;
 use indicatif::ProgressBar;
 
 use super::configured::Configured;
-use super::console::{self, Total};
+use super::console;
 use super::signals::CANCEL;
 use lanesweep_model::plausibility::Implausible;
 use lanesweep_model::scenario::{DataProvenance, Driven, Scenario, ScenarioFile, read_scenario_file};
@@ -22,7 +22,7 @@ use lanesweep_traffic::mining::{Collection, counts, counts_text};
 /// As [`Source::load`].
 pub(super) fn load(source: &Source, configured: &Configured, implausible: Implausible) -> Result<Collection> {
     let what = if matches!(source, Source::Generated(_)) { "generating and mining" } else { "reading and mining" };
-    let collection = configured.with_bar(Total::Exact(source.recordings()), what, |bar| {
+    let collection = configured.with_bar(source.recordings(), what, |bar| {
         source.load(&configured.settings.mining, implausible, || advance(bar))
     })?;
     complain_of(&collection.problems, &collection.notes);

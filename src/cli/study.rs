@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::Args;
 
 use super::configured::Configured;
-use super::console::{self, Total};
+use super::console;
 use super::format::FormatFlag;
 use super::settings::KeepPlan;
 use super::shard_flags::ShardFlags;
@@ -171,7 +171,7 @@ impl Study {
         let units = run.units();
         let lanes = plan.first_lane_of(units.end) - plan.first_lane_of(units.start);
         tracing::info!("{} runs on {}", readable::count(lanes), backend.describe());
-        let missing = Total::Exact(run.missing()?);
+        let missing = run.missing()?;
         let mut rows = self.rows.as_deref().map(|path| study_table(path, study)).transpose()?;
         let mut write = rows.as_mut().map(|rows| |plan: &LanePlan, chunk: &Chunk| write_study_chunk(rows, plan, chunk));
         timed(&mut timings.sweep_s, || {
