@@ -336,7 +336,7 @@ impl Check {
 
     /// Drivers whose smallest gap is not distinguishable from a contact.
     fn touching(&self, changed: &[Changed], profile: &Profile) -> Result<Vec<ModelId>> {
-        let finer = Perturbation::FinerStep;
+        let finer = Perturbation::FINER_STEP;
         let Some(found) = changed.iter().find(|changed| changed.by == finer.label()) else { return Ok(Vec::new()) };
         let finer_dt_s = finer.profile(profile)?.frame.dt_s;
         let touches = |model: &ModelId| {
