@@ -19,11 +19,15 @@ use lanesweep_support::input_file::{self, plain_name};
 use lanesweep_support::table::{NameUnit, TableFormat, TableReader};
 use lanesweep_support::{Error, Place, Result, option};
 
-/// A case in flags: one per number of a case.
-#[derive(Debug, Clone, Default)]
-pub(super) struct CaseFlags {
+/// A case as it is given: by flags, one per number, by a file or by a row of a table.
+#[derive(Debug, Default)]
+pub(super) struct GivenCase {
     parameters: CaseParameters,
     models: Option<String>,
+    /// Its key in a table.
+    pub id: Option<String>,
+    /// The place of a row's values.
+    row: Option<RowPlace>,
 }
 
 /// The numbers that have a flag; a duration is of files only.
@@ -36,7 +40,7 @@ fn written(number: &'static CaseNumber) -> impl Fn(&str) -> std::result::Result<
     move |text| number.set_text(&mut CaseParameters::default(), text).map(|()| text.to_owned())
 }
 
-impl Args for CaseFlags {
+impl Args for GivenCase {
     fn augment_args(command: Command) -> Command {
         let category = Arg::new("category").value_name("NAME").help("Kind of scenario: cut-in, cut-out, lvd");
         let models = Arg::new("models").value_name("LIST").action(ArgAction::Append).value_delimiter(',');
@@ -62,8 +66,8 @@ impl Args for CaseFlags {
     }
 }
 
-impl FromArgMatches for CaseFlags {
-    fn from_arg_matches(matches: &ArgMatches) -> std::result::Result<CaseFlags, clap::Error> {
+impl FromArgMatches for GivenCase {
+    fn from_arg_matches(matches: &ArgMatches) -> std::result::Result<GivenCase, clap::Error> {
         let category = matches.get_one::<String>("category").cloned();
         let mut parameters = CaseParameters { category, ..CaseParameters::default() };
         for number in numbers() {
@@ -72,27 +76,16 @@ impl FromArgMatches for CaseFlags {
             number.set_text(&mut parameters, text).map_err(|problem| clap::Error::raw(kind, problem))?;
         }
         let models = matches.get_many::<String>("models").map(|names| names.cloned().collect::<Vec<_>>().join(","));
-        Ok(CaseFlags { parameters, models })
+        Ok(GivenCase { parameters, models, ..GivenCase::default() })
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> std::result::Result<(), clap::Error> {
-        *self = CaseFlags::from_arg_matches(matches)?;
+        *self = GivenCase::from_arg_matches(matches)?;
         Ok(())
     }
 }
 
-/// A case as it is given: flags over a file or a row of a table.
-#[derive(Debug, Default)]
-pub(super) struct GivenCase {
-    parameters: CaseParameters,
-    models: Option<String>,
-    /// Its key in a table.
-    pub id: Option<String>,
-    /// The place of a row's values.
-    row: Option<RowPlace>,
-}
-
-impl CaseFlags {
+impl GivenCase {
     /// Width of the lanes, m, if given.
     pub(super) fn lane_width_m(&self) -> Option<f64> {
         self.parameters[CaseQuantity::LaneWidth]
@@ -111,7 +104,7 @@ impl CaseFlags {
     /// The initial distance, if given.
     pub(super) fn start(&self) -> Result<Option<Headway>> {
         let is_given = [CaseQuantity::Gap, CaseQuantity::Thw].iter().any(|start| self.parameters[*start].is_some());
-        if is_given { self.over(GivenCase::default()).headway().map(Some) } else { Ok(None) }
+        is_given.then(|| self.headway()).transpose()
     }
 
     /// Whether it gives a value of the case other than these.
@@ -123,9 +116,7 @@ impl CaseFlags {
     pub(super) fn named_models(&self) -> Result<Option<Vec<ModelId>>> {
         self.models.as_ref().map(|list| super::lists::models(list.split(','), "models")).transpose()
     }
-}
 
-impl GivenCase {
     /// Whether it gives no value of the case.
     pub(super) fn is_empty(&self) -> bool {
         self.parameters == CaseParameters::default()

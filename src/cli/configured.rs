@@ -170,21 +170,16 @@ impl Configured {
                 layers.flag(&key.name, &option(name), &word.to_string_lossy())?;
             }
         }
-        let configured = Configured::combined(layers, command, cli.common.level())?;
-        if let Verb::Sample(sample) = &mut cli.verb {
-            sample.settings = configured.settings.sample.clone();
-        }
-        Ok((cli, configured))
-    }
-
-    fn combined(layers: Layers, command: String, level: Level) -> Result<Configured> {
-        let mut settings = layers.settings()?;
+        let (mut settings, level) = (layers.settings()?, cli.common.level());
         let layer = |key: &str| layers.get(key).map_or(0, |setting| setting.origin.layer());
         // A backend without devices overrides a device of an earlier source.
         if settings.run.backend == BackendChoice::Cpu && layer("run.backend") > layer("run.device") {
             settings.run.device = None;
         }
-        Ok(Configured { settings, layers, command, level, started: Instant::now() })
+        if let Verb::Sample(sample) = &mut cli.verb {
+            sample.settings = settings.sample.clone();
+        }
+        Ok((cli, Configured { settings, layers, command, level, started: Instant::now() }))
     }
 
     /// The profile with its time step.

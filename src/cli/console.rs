@@ -250,7 +250,8 @@ pub(super) fn complain(error: &Error) {
     }
     let part = |text: &str| unbroken(&shown(text));
     let _ = miette::set_hook(Box::new(|_| Box::new(miette::MietteHandlerOpts::new().break_words(false).build())));
-    let report = Diagnostic { text: part(&error.to_string()), help: error.help().map(|help| part(&help)) };
+    let mut report = miette::MietteDiagnostic::new(part(&error.to_string()));
+    report.help = error.help().map(|help| part(&help));
     let back = |c: char| (c as u32).checked_sub(WHOLE).and_then(char::from_u32).unwrap_or(c);
     let report: String = format!("{:?}", miette::Report::new(report)).chars().map(back).collect();
     // Ignore a closed stderr: no message can be shown.
@@ -303,18 +304,4 @@ fn verbs_with(flag: &str) -> Vec<String> {
     let Some(flag) = flag.strip_prefix("--") else { return Vec::new() };
     let has = |verb: &&clap::Command| verb.get_arguments().any(|arg| arg.get_long() == Some(flag));
     super::configured::command().get_subcommands().filter(has).map(|verb| verb.get_name().to_owned()).collect()
-}
-
-/// Adapts a library error for miette.
-#[derive(Debug, thiserror::Error)]
-#[error("{text}")]
-struct Diagnostic {
-    text: String,
-    help: Option<String>,
-}
-
-impl miette::Diagnostic for Diagnostic {
-    fn help<'a>(&'a self) -> Option<Box<dyn std::fmt::Display + 'a>> {
-        self.help.as_ref().map(|help| Box::new(help) as Box<dyn std::fmt::Display>)
-    }
 }

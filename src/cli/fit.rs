@@ -60,7 +60,7 @@ pub(super) struct Fit {
 impl Fit {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         let config = &configured.settings;
-        let ids = self.ids()?;
+        let ids = self.parameterizations.list(&self.categories.list()?)?;
         let typed = self.exposure.driven()?;
         let options = FitOptions {
             parameterization: config.of_densities(),
@@ -107,11 +107,6 @@ impl Fit {
         let output = self.format.output(exit, || text(&facts, &fitted), json)?;
         tracing::info!("{} written to {}", counted(fitted.len(), "density file"), self.out.display());
         Ok(output)
-    }
-
-    /// The parameterizations to fit, in the registry's order.
-    fn ids(&self) -> Result<Vec<Parameterization>> {
-        self.parameterizations.list(&self.categories.list()?)
     }
 
     /// One file per density.

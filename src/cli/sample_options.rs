@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use super::sample::Sample;
+use super::source::check_lane_table;
 use crate::settings::{Assurance, EstimatorKind};
 use lanesweep_model::driver::ModelId;
-use lanesweep_report::lanes::table_format;
 use lanesweep_run::sampling::{Estimator, SampleHeadways, SampleOptions, read_proposal};
 use lanesweep_stats::density::DensityModel;
 use lanesweep_stats::estimate::{Goal, Search, StopRule};
@@ -126,11 +126,8 @@ impl Sample {
     }
 }
 
-/// Checks that a table of lanes replaces no other result.
+/// Checks a table of lanes: that it replaces no other result, nor another table.
 pub(super) fn guard(table: &Path, flag: &'static str, out: &Path, other: Option<&PathBuf>) -> Result<()> {
-    let results = ["estimate.json", "estimates.csv", "convergence.csv", "density.json"];
-    let others: Vec<PathBuf> = results.iter().map(|name| out.join(name)).chain(other.cloned()).collect();
-    super::source::refuse_overwriting(table, &others, flag)?;
-    table_format(table, flag)?;
-    lanesweep_support::files::check_output(table)
+    let results = ["estimate.json", "estimates.csv", "convergence.csv", "density.json"].map(|name| out.join(name));
+    check_lane_table(table, flag, &results.into_iter().chain(other.cloned()).collect::<Vec<_>>())
 }

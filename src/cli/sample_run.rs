@@ -11,7 +11,7 @@ use lanesweep_engine::{Chunk, CpuBackend, Executor, LanePlan, OpenBackend};
 use lanesweep_report::lanes;
 use lanesweep_report::sampling::SampleReport;
 use lanesweep_run::parts::{EachChunk, Job, PLAN_FILE};
-use lanesweep_run::sampling::{self, FailingLane, SampleJob, SampleKind, SampleOptions, SampleResult};
+use lanesweep_run::sampling::{self, FailingLane, SampleKind, SampleOptions, SampleResult};
 use lanesweep_stats::density::read_density;
 use lanesweep_stats::estimate::{Search, StopRule};
 use lanesweep_support::atomic_file::StagedFile;
@@ -117,23 +117,8 @@ impl Sample {
         if self.shards.plan_only {
             return self.format.planned(Exit::Ok, sample.lane_count(), &self.out.join(PLAN_FILE));
         }
-        match sample.job()? {
-            SampleJob::Crude(job) => self.run_job(&job, &sample, opened, executor, configured),
-            SampleJob::Weighted(job) => self.run_job(&job, &sample, opened, executor, configured),
-        }
-    }
-
-    /// Executes a job, whole or a shard of it.
-    fn run_job(
-        &self,
-        job: &impl Job<Result = SampleResult>,
-        sample: &sampling::Sample,
-        opened: &OpenBackend,
-        executor: &Executor,
-        configured: &Configured,
-    ) -> Result<Output> {
         // Rows are written during the run, so a run with rows cannot resume.
-        let Some(mut run) = job.open(&self.out, self.shards.shard, self.rows.is_none())? else {
+        let Some(mut run) = sample.open(&self.out, self.shards.shard, self.rows.is_none())? else {
             tracing::info!("this part exists already and is complete");
             return Ok(Exit::Ok.into());
         };
@@ -146,11 +131,11 @@ impl Sample {
         tracing::info!("{} samples{beside} on {}", count(missing), executor.backend.describe());
         let is_empty = run.units().is_empty();
         let rows = self.rows.as_deref().filter(|_| !is_empty);
-        let mut table = rows.map(|path| lanes::sampled_table(path, sample)).transpose()?;
-        let failures = self.failures.as_deref().map(|path| lanes::sampled_table(path, sample)).transpose()?;
+        let mut table = rows.map(|path| lanes::sampled_table(path, &sample)).transpose()?;
+        let failures = self.failures.as_deref().map(|path| lanes::sampled_table(path, &sample)).transpose()?;
         let mut write_chunk = table
             .as_mut()
-            .map(|table| |plan: &LanePlan, chunk: &Chunk| lanes::write_sampled_chunk(table, sample, plan, chunk));
+            .map(|table| |plan: &LanePlan, chunk: &Chunk| lanes::write_sampled_chunk(table, &sample, plan, chunk));
         let each = write_chunk.as_mut().map(|write| write as &mut EachChunk);
         configured.with_progress(missing, "sampling", executor, |executor| run.compute(executor, each))?;
         let rows = table.map(TableWriter::stage).transpose()?;
@@ -163,7 +148,7 @@ impl Sample {
         if let Some(half_width) = self.settings.half_width.filter(|_| self.is_refined()) {
             tracing::info!("importance sampling of what is rare");
             let search = self.search(&sample.options.models, &sample.options.headways);
-            let units = warn_of_long(sample, &search);
+            let units = warn_of_long(&sample, &search);
             result = configured.with_progress(units, "searching", executor, |executor| {
                 sample.refined(result, &search, half_width, executor)
             })?;
@@ -178,12 +163,12 @@ impl Sample {
                 );
             }
         }
-        let failures = failures.map(|table| list_failures(table, sample, &result, configured)).transpose()?;
+        let failures = failures.map(|table| list_failures(table, &sample, &result, configured)).transpose()?;
         let host = configured.host(opened, result.rechecked_lanes, self.shards.plan.is_some());
         let mut results = run.results()?;
         rows.into_iter().chain(failures).for_each(|table| results.join(table));
-        let report = SampleReport::of_sample(sample, &result, host)?;
-        let files = report.write(results, sample, &result)?;
+        let report = SampleReport::of_sample(&sample, &result, host)?;
+        let files = report.write(results, &sample, &result)?;
         let output = self.format.output_in(&self.out, Exit::Ok, || report.text(), || report.json(&files))?;
         run.close()?;
         Ok(output.with_tables(|| files.tables))

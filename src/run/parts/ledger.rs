@@ -6,7 +6,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::journal::{Journal, Records};
-use lanesweep_engine::{Partial, SampleTally};
+use lanesweep_engine::Partial;
 use lanesweep_support::{Error, Result};
 
 /// Counts over a set of units of one plan that can be merged in any order.
@@ -263,16 +263,6 @@ impl MergeableCounts for Partial {
             }
         }
         intervals
-    }
-
-    fn join(self, other: Self) -> Result<Self> {
-        self.merge(other)
-    }
-}
-
-impl MergeableCounts for SampleTally {
-    fn covered(&self) -> Vec<Range<u64>> {
-        SampleTally::covered(self).to_vec()
     }
 
     fn join(self, other: Self) -> Result<Self> {
