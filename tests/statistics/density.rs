@@ -4,7 +4,6 @@
 use crate::common;
 use crate::common::mined::{self, scenarios_of};
 
-use lanesweep::run::sampling::{proposal_from_text, proposal_text};
 use lanesweep::scenario::parameterization::{
     Family, Kinematic, LaneChange, Parameterization, ParameterizationOptions, Reduction, Sizes, SpeedProfile,
     SvdLateral, Variable,
@@ -463,12 +462,4 @@ fn files_of_earlier_versions_keep_their_checksum_and_other_kinds_are_refused() {
     let error = DensityModel::from_json(other.as_bytes(), &place).unwrap_err();
     assert!(error.to_string().contains("a density of kind `copula`"), "{error}");
     assert_eq!(error.help().as_deref(), Some("fit again"));
-
-    // A proposal says of which form its density was.
-    let density = model(Category::CutIn, "1");
-    let proposal = proposal_text(&density, &density.kde.mixture().unwrap()).unwrap();
-    for (form, is_read) in [("kernel", true), ("copula", false)] {
-        let of_form = proposal.replacen('{', &format!("{{\"density_form\": \"{form}\","), 1);
-        assert_eq!(proposal_from_text(of_form.as_bytes(), &density, &place).is_ok(), is_read, "{form}");
-    }
 }
