@@ -99,7 +99,8 @@ struct CheckRequest {
 
 impl Check {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
-        configured.refuse_assigned(
+        configured.refuse_lane_keys(
+            false,
             "has no effect on a check",
             &format!("leave it out; {} names the profiles, which hold the time step", option("profiles")),
         )?;

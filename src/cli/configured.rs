@@ -276,27 +276,21 @@ impl Configured {
         )
     }
 
-    /// Refuses `--config KEY=VALUE` about lanes where `why` says that it has no effect. Files are allowed, because
+    /// Refuses `--config KEY=VALUE` about lanes where `why` says that it has no effect. Files may be allowed, because
     /// other commands share them.
     ///
     /// # Errors
     /// [`Error::Usage`].
-    pub(super) fn refuse_assigned(&self, why: &str, help: &str) -> Result<()> {
-        self.refuse_lane_keys(false, why, help)
-    }
-
-    fn refuse_lane_keys(&self, are_files_refused: bool, why: &str, help: &str) -> Result<()> {
+    pub(super) fn refuse_lane_keys(&self, are_files_refused: bool, why: &str, help: &str) -> Result<()> {
         let is_refused = |origin: &Origin| match origin {
             Origin::Assignment(_) => true,
             Origin::File { .. } => are_files_refused,
             _ => false,
         };
-        match self.layers.given().find(|setting| is_refused(&setting.origin) && is_of_plan(&setting.key.name)) {
-            None => Ok(()),
-            Some(Setting { key, origin, .. }) => {
-                Err(Error::usage(origin.place(&key.name), format!("`{}` {why}", key.name), help))
-            }
-        }
+        let mut refused = self.layers.given().filter(|of| is_refused(&of.origin) && is_of_plan(&of.key.name));
+        refused.next().map_or(Ok(()), |Setting { key, origin, .. }| {
+            Err(Error::usage(origin.place(&key.name), format!("`{}` {why}", key.name), help))
+        })
     }
 }
 

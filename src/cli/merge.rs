@@ -8,10 +8,9 @@ use super::configured::Configured;
 use super::format::FormatFlag;
 use super::sample_options::guard;
 use super::sample_run::list_failures;
-use super::{COMMIT, Exit, Output};
+use super::{COMMIT, Output};
 use lanesweep_report::host::{Host, Timings};
 use lanesweep_report::lanes::sampled_table;
-use lanesweep_report::sampling::SampleReport;
 use lanesweep_report::study::StudyReport;
 use lanesweep_run::parts::PLAN_FILE;
 use lanesweep_run::sampling::{ESTIMATE_RECORD, Sample};
@@ -69,10 +68,7 @@ impl Merge {
                 let table = table.map(|table| list_failures(table, &sample, &result, configured)).transpose()?;
                 let mut results = folder.results()?;
                 table.into_iter().for_each(|table| results.join(table));
-                let report = SampleReport::of_sample(&sample, &result, host)?;
-                let files = report.write(results, &sample, &result)?;
-                let output = self.format.output_in(&self.folder, Exit::Ok, || report.text(), || report.json(&files))?;
-                Ok(output.with_tables(|| files.tables))
+                self.format.sample(&sample, &result, host, results)
             }
         }
     }

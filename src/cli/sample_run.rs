@@ -9,7 +9,6 @@ use super::signals::CANCEL;
 use super::{Exit, Output};
 use lanesweep_engine::{Chunk, CpuBackend, Executor, LanePlan, OpenBackend};
 use lanesweep_report::lanes;
-use lanesweep_report::sampling::SampleReport;
 use lanesweep_run::parts::{EachChunk, Job, PLAN_FILE};
 use lanesweep_run::sampling::{self, FailingLane, SampleKind, SampleOptions, SampleResult};
 use lanesweep_stats::density::read_density;
@@ -167,11 +166,9 @@ impl Sample {
         let host = configured.host(opened, result.rechecked_lanes, self.shards.plan.is_some());
         let mut results = run.results()?;
         rows.into_iter().chain(failures).for_each(|table| results.join(table));
-        let report = SampleReport::of_sample(&sample, &result, host)?;
-        let files = report.write(results, &sample, &result)?;
-        let output = self.format.output_in(&self.out, Exit::Ok, || report.text(), || report.json(&files))?;
+        let output = self.format.sample(&sample, &result, host, results)?;
         run.close()?;
-        Ok(output.with_tables(|| files.tables))
+        Ok(output)
     }
 }
 
@@ -182,14 +179,9 @@ pub(super) fn list_failures(
     result: &SampleResult,
     configured: &Configured,
 ) -> Result<StagedFile> {
-    let samples = match (&result.crude, &sample.kind) {
-        (Some(run), _) => run.tally.samples(),
-        (None, SampleKind::Weighted(weighted)) => weighted.draws.draws,
-        (None, _) => 0,
-    };
     let cpu = CpuBackend::lane_arithmetic();
     let executor = Executor::new(&cpu).with_cancel(CANCEL.clone());
-    configured.with_progress(samples, "failing lanes", &executor, |executor| {
+    configured.with_progress(sample.unit_count(), "failing lanes", &executor, |executor| {
         let limit = configured.settings.sample.failures_limit;
         let each = &mut |lane: &FailingLane| lanes::write_failing_lane(&mut table, sample, lane);
         sample.failing_lanes(result, limit, executor, each)

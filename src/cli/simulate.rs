@@ -125,7 +125,7 @@ impl Simulate {
         };
         let reopened = match (&self.from, &self.scenarios) {
             (Some(dir), scenarios) => {
-                configured.refuse_assigned(&format!("is decided by the run ({from})"), "leave it out")?;
+                configured.refuse_lane_keys(false, &format!("is decided by the run ({from})"), "leave it out")?;
                 let reopened = Reopened::run(dir, key)?;
                 if scenarios.is_some() && reopened.as_study().is_none() {
                     let problem = "sampled lanes have the mean sizes of their density".to_owned();
