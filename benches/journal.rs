@@ -10,12 +10,12 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use common::paper_size_scenarios;
-use lanesweep::engine::{CpuBackend, Executor, Headway, Partial, SampleTally, Wanted};
+use lanesweep::engine::{CpuBackend, Executor, Headway, Partial, Wanted};
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::{
     Job, Journal, Ledger, MergeableCounts, Part, read_part, read_sealed_line, seal, write_part,
 };
-use lanesweep::run::sampling::{Estimator, Sample, SampleHeadways, SampleJob, SampleOptions};
+use lanesweep::run::sampling::{Estimator, Sample, SampleCounts, SampleHeadways, SampleOptions};
 use lanesweep::run::study::{StudyCases, StudyHead, StudyOptions, outline_study};
 use lanesweep::scenario::DataProvenance;
 use lanesweep::scenario::parameterization::Parameterization;
@@ -42,11 +42,10 @@ fn sampling(folder: &Path) {
     let samples = 2_000_000;
     let options = SampleOptions::new(Estimator::Crude, samples, SampleHeadways::Each(vec![Headway::ThwS(1.0)]));
     let sample = Sample::plan(density(), &Profile::load("paper").unwrap(), &options).unwrap();
-    let SampleJob::Crude(job) = sample.job().unwrap() else { unreachable!("crude Monte Carlo") };
     let backend = CpuBackend::lane_arithmetic();
     let executor = Executor::new(&backend);
-    pairs("sample", folder, samples, &job.cuts(), |ledger: &mut Ledger<SampleTally>| {
-        job.compute(ledger, &executor, None).unwrap();
+    pairs("sample", folder, samples, &sample.cuts(), |ledger: &mut Ledger<SampleCounts>| {
+        sample.compute(ledger, &executor, None).unwrap();
     });
 }
 

@@ -3,6 +3,7 @@
 //!
 //! An example of how a model is added, not a regulation's model: what R152 does not say is marked illustrative.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Bound, DriverModel, DriverProfile, DriverState, Hazard, View, delay_steps, latched_braking};
@@ -10,7 +11,7 @@ use crate::category::Category;
 use crate::scalar::Real;
 
 /// Constants of the model as a profile gives them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct AebProfile {
     /// Time to collision at which the system intervenes, s (illustrative: R152 asks for results in tests, not

@@ -1,7 +1,6 @@
 //! Concrete cases from flags, a TOML file or a table.
 
 use std::collections::HashMap;
-use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::Path;
 
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
@@ -20,11 +19,15 @@ use lanesweep_support::input_file::{self, plain_name};
 use lanesweep_support::table::{NameUnit, TableFormat, TableReader};
 use lanesweep_support::{Error, Place, Result, option};
 
-/// A case in flags: one per number of a case.
-#[derive(Debug, Clone, Default)]
-pub(super) struct CaseFlags {
+/// A case as it is given: by flags, one per number, by a file or by a row of a table.
+#[derive(Debug, Default)]
+pub(super) struct GivenCase {
     parameters: CaseParameters,
     models: Option<String>,
+    /// Its key in a table.
+    pub id: Option<String>,
+    /// The place of a row's values.
+    row: Option<RowPlace>,
 }
 
 /// The numbers that have a flag; a duration is of files only.
@@ -37,7 +40,7 @@ fn written(number: &'static CaseNumber) -> impl Fn(&str) -> std::result::Result<
     move |text| number.set_text(&mut CaseParameters::default(), text).map(|()| text.to_owned())
 }
 
-impl Args for CaseFlags {
+impl Args for GivenCase {
     fn augment_args(command: Command) -> Command {
         let category = Arg::new("category").value_name("NAME").help("Kind of scenario: cut-in, cut-out, lvd");
         let models = Arg::new("models").value_name("LIST").action(ArgAction::Append).value_delimiter(',');
@@ -63,8 +66,8 @@ impl Args for CaseFlags {
     }
 }
 
-impl FromArgMatches for CaseFlags {
-    fn from_arg_matches(matches: &ArgMatches) -> std::result::Result<CaseFlags, clap::Error> {
+impl FromArgMatches for GivenCase {
+    fn from_arg_matches(matches: &ArgMatches) -> std::result::Result<GivenCase, clap::Error> {
         let category = matches.get_one::<String>("category").cloned();
         let mut parameters = CaseParameters { category, ..CaseParameters::default() };
         for number in numbers() {
@@ -73,27 +76,16 @@ impl FromArgMatches for CaseFlags {
             number.set_text(&mut parameters, text).map_err(|problem| clap::Error::raw(kind, problem))?;
         }
         let models = matches.get_many::<String>("models").map(|names| names.cloned().collect::<Vec<_>>().join(","));
-        Ok(CaseFlags { parameters, models })
+        Ok(GivenCase { parameters, models, ..GivenCase::default() })
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> std::result::Result<(), clap::Error> {
-        *self = CaseFlags::from_arg_matches(matches)?;
+        *self = GivenCase::from_arg_matches(matches)?;
         Ok(())
     }
 }
 
-/// A case as it is given: flags over a file or a row of a table.
-#[derive(Debug, Default)]
-pub(super) struct GivenCase {
-    parameters: CaseParameters,
-    models: Option<String>,
-    /// Its key in a table.
-    pub id: Option<String>,
-    /// The place of a row's values.
-    row: Option<RowPlace>,
-}
-
-impl CaseFlags {
+impl GivenCase {
     /// Width of the lanes, m, if given.
     pub(super) fn lane_width_m(&self) -> Option<f64> {
         self.parameters[CaseQuantity::LaneWidth]
@@ -112,7 +104,7 @@ impl CaseFlags {
     /// The initial distance, if given.
     pub(super) fn start(&self) -> Result<Option<Headway>> {
         let is_given = [CaseQuantity::Gap, CaseQuantity::Thw].iter().any(|start| self.parameters[*start].is_some());
-        if is_given { self.over(GivenCase::default()).headway().map(Some) } else { Ok(None) }
+        is_given.then(|| self.headway()).transpose()
     }
 
     /// Whether it gives a value of the case other than these.
@@ -124,9 +116,7 @@ impl CaseFlags {
     pub(super) fn named_models(&self) -> Result<Option<Vec<ModelId>>> {
         self.models.as_ref().map(|list| super::lists::models(list.split(','), "models")).transpose()
     }
-}
 
-impl GivenCase {
     /// Whether it gives no value of the case.
     pub(super) fn is_empty(&self) -> bool {
         self.parameters == CaseParameters::default()
@@ -202,18 +192,13 @@ pub(super) struct GivenCases {
     lines: HashMap<String, u64>,
     /// Where each id of several rows was last.
     doubled: HashMap<String, u64>,
-    /// First row of each case, by the hash of its values.
-    cases: HashMap<u64, usize>,
-    /// Rows that are equal to an earlier one but for their ids, with that one.
-    copies: Vec<[usize; 2]>,
 }
 
 impl GivenCases {
     pub(super) fn open(path: &Path) -> Result<GivenCases> {
         let format = TableFormat::of(&plain_name(path), &[TableFormat::Csv, TableFormat::Parquet], &option("table"))?;
         let rows = ParameterRows::new(TableReader::open(path, format)?)?;
-        let (row, lines, doubled, cases, copies) = Default::default();
-        Ok(GivenCases { rows, row, lines, doubled, cases, copies })
+        Ok(GivenCases { rows, row: 0, lines: HashMap::new(), doubled: HashMap::new() })
     }
 
     /// Number of the last row, from 1 after the header.
@@ -229,11 +214,7 @@ impl GivenCases {
 
     /// Warnings about the rows so far.
     pub(super) fn notes(&self) -> Vec<String> {
-        let number = self.copies.len();
-        let copies = self.copies.first().map(|[row, earlier]| {
-            format!("{number} row(s) are equal to another one but for their ids and count again, the first: row {row} is row {earlier}")
-        });
-        self.rows.notes().into_iter().chain(copies).collect()
+        self.rows.notes()
     }
 
     fn doubled_with(&self, line: u64) -> Error {
@@ -252,11 +233,6 @@ impl GivenCases {
                 given.located::<()>(Err(self.doubled_with(first)))?;
             }
             self.lines.extend(given.id.clone().map(|id| (id, line)));
-            let mut hash = DefaultHasher::new();
-            (&given.models, &given.parameters.category).hash(&mut hash);
-            given.parameters.numbers.map(|number| number.map(f64::to_bits)).hash(&mut hash);
-            let first = *self.cases.entry(hash.finish()).or_insert(self.row);
-            self.copies.extend((first < self.row).then_some([self.row, first]));
             Ok(given)
         });
         Ok(Some(row))

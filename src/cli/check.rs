@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::case_flags::{CaseFlags, GivenCase, from_table, from_toml};
+use super::case_flags::{GivenCase, from_table, from_toml};
 use super::check_table::CheckedTable;
 use super::configured::{Configured, load_profile};
 use super::format::FormatFlag;
-use super::source::{PlausibilityFlag, scenarios_of};
+use super::source::{PlausibilityFlag, check_ending, scenarios_of};
 use super::{COMMIT, Exit, Output};
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::plausibility::Doubts;
@@ -57,7 +57,7 @@ pub(super) struct Check {
     #[arg(long, value_name = "ID", requires = "file", conflicts_with = "row", help_heading = "Data")]
     scenario: Option<String>,
     #[command(flatten)]
-    case: CaseFlags,
+    pub(super) case: GivenCase,
     /// Profiles; the first one decides [default: un-r157, and the five others]
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Models and criteria")]
     profiles: Vec<String>,
@@ -69,12 +69,12 @@ pub(super) struct Check {
     sheet: Option<PathBuf>,
     /// Also write a table's answers, one row per case: .csv, .jsonl or .parquet
     #[arg(long, value_name = "FILE", help_heading = "Output")]
-    rows: Option<PathBuf>,
+    pub(super) rows: Option<PathBuf>,
     /// Only the computed answers of a table, by lanes: a million rows take seconds
     ///
     /// No perturbation, clause or boundary is examined, so that no answer is robust.
     #[arg(long, help_heading = "Models and criteria")]
-    nominal: bool,
+    pub(super) nominal: bool,
     /// Date of the run, as the sheet is to show it; the clock is not asked
     #[arg(long, value_name = "TEXT", help_heading = "Output")]
     date: Option<String>,
@@ -82,9 +82,9 @@ pub(super) struct Check {
     #[arg(long, value_name = "TEXT", help_heading = "Output")]
     author: Option<String>,
     #[command(flatten)]
-    plausibility: PlausibilityFlag,
+    pub(super) plausibility: PlausibilityFlag,
     #[command(flatten)]
-    format: FormatFlag,
+    pub(super) format: FormatFlag,
 }
 
 /// The checked case, with facts for the reader.
@@ -99,7 +99,8 @@ struct CheckRequest {
 
 impl Check {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
-        configured.refuse_assigned(
+        configured.refuse_lane_keys(
+            false,
             "has no effect on a check",
             &format!("leave it out; {} names the profiles, which hold the time step", option("profiles")),
         )?;
@@ -110,16 +111,7 @@ impl Check {
         let table = self.whole_table();
         self.guard_flags(table)?;
         if let Some(path) = table {
-            let table = CheckedTable {
-                path,
-                profile: &profiles[0],
-                models: &models,
-                case: &self.case,
-                implausible: self.plausibility.policy(),
-                is_nominal: self.nominal,
-                rows: self.rows.as_deref(),
-            };
-            return table.run(configured, self.format);
+            return CheckedTable { check: self, path, profile: &profiles[0], models: &models }.run(configured);
         }
         let request = self.request(&profiles[0])?;
         if self.profiles.is_empty() {
@@ -248,12 +240,7 @@ impl Check {
             TableFormat::of(path, &TableFormat::EVERY, &option("rows"))?;
             check_output(path)?;
         }
-        let Some(path) = &self.sheet else { return Ok(()) };
-        if path.extension().is_none_or(|found| !found.eq_ignore_ascii_case("html")) {
-            let problem = format!("{} does not end in .html", path.display());
-            return Err(Error::usage(Place::option("sheet"), problem, "give a name that ends in .html"));
-        }
-        check_output(path)
+        self.sheet.as_ref().map_or(Ok(()), |path| check_ending(path, "html", "sheet"))
     }
 }
 

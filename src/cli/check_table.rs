@@ -4,22 +4,22 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use super::case_flags::{CaseFlags, GivenCase, GivenCases};
+use super::case_flags::{GivenCase, GivenCases};
+use super::check::Check;
 use super::configured::Configured;
-use super::console::{self, Total};
-use super::format::FormatFlag;
+use super::console;
 use super::signals::CANCEL;
 use super::source::complain_of;
 use super::{Exit, Output};
 use lanesweep_engine::Executor;
 use lanesweep_model::driver::ModelId;
-use lanesweep_model::plausibility::{Doubts, Implausible};
+use lanesweep_model::plausibility::Doubts;
 use lanesweep_model::profile::Profile;
 use lanesweep_model::scenario::COLUMNS_HELP;
 use lanesweep_report::case_identity::CaseIdentity;
 use lanesweep_report::case_sheet::CaseSheet;
 use lanesweep_report::case_table::{CaseAnswer, CaseAnswers};
-use lanesweep_run::check::{Check, Subject, nominal_verdicts};
+use lanesweep_run::check::{self, Subject, nominal_verdicts};
 use lanesweep_support::files::make_folder_of;
 use lanesweep_support::input_file::unchanged;
 use lanesweep_support::{Error, Place, Result};
@@ -29,15 +29,11 @@ const ROWS: [usize; 2] = [256, 1 << 16];
 
 /// A table, and what is to be made of it.
 pub(super) struct CheckedTable<'a> {
+    /// The verb's flags; those of the case override values of the table.
+    pub check: &'a Check,
     pub path: &'a Path,
     pub profile: &'a Profile,
     pub models: &'a [ModelId],
-    /// Values that override those of the table.
-    pub case: &'a CaseFlags,
-    pub implausible: Implausible,
-    /// Only the answers of lanes.
-    pub is_nominal: bool,
-    pub rows: Option<&'a Path>,
 }
 
 /// A row with its case, or why it has none.
@@ -45,21 +41,21 @@ type Row = (usize, Result<(Subject, GivenCase)>);
 
 impl CheckedTable<'_> {
     /// Judges every row.
-    pub(super) fn run(&self, configured: &Configured, format: FormatFlag) -> Result<Output> {
+    pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         let mut table = GivenCases::open(self.path)?;
-        let mut doubts = Doubts::new(self.implausible);
-        let opened = self.is_nominal.then(|| configured.open()).transpose()?;
+        let (mut doubts, is_nominal) = (Doubts::new(self.check.plausibility.policy()), self.check.nominal);
+        let opened = is_nominal.then(|| configured.open()).transpose()?;
         let (mut cases, mut broken, mut is_end) = (Vec::new(), Vec::new(), false);
-        configured.with_bar(Total::AtMost(u64::MAX), "judging", |bar| {
+        configured.with_bar(u64::MAX, "judging", |bar| {
             while !is_end {
                 let mut rows: Vec<Row> = Vec::new();
-                while rows.len() < ROWS[usize::from(self.is_nominal)] && !is_end {
+                while rows.len() < ROWS[usize::from(is_nominal)] && !is_end {
                     let Some(given) = table.next()? else {
                         is_end = true;
                         continue;
                     };
                     let subject = given.and_then(|given| {
-                        let given = self.case.over(given);
+                        let given = self.check.case.over(given);
                         Ok((given.subject(self.profile, &mut doubts)?, given))
                     });
                     rows.push((table.row(), subject));
@@ -96,14 +92,14 @@ impl CheckedTable<'_> {
             profile: self.profile.name.clone(),
             cases,
             broken,
-            is_nominal: self.is_nominal,
+            is_nominal,
         };
-        if let Some(path) = self.rows {
+        if let Some(path) = &self.check.rows {
             make_folder_of(path)?;
             answers.save(path)?;
         }
         let exit = if is_complete { Exit::from(answers.worst()) } else { Exit::Incomplete };
-        let output = format.output(exit, || answers.text(console::width()), || answers.json())?;
+        let output = self.check.format.output(exit, || answers.text(console::width()), || answers.json())?;
         Ok(output.with_tables(|| vec![("cases".to_owned(), answers.all())]))
     }
 
@@ -132,7 +128,7 @@ impl CheckedTable<'_> {
     }
 
     fn judge(&self, row: usize, id: Option<String>, subject: Subject) -> Result<CaseAnswer> {
-        let check = Check { subject, profiles: vec![self.profile.clone()], models: self.models.to_vec() };
+        let check = check::Check { subject, profiles: vec![self.profile.clone()], models: self.models.to_vec() };
         let judgements = check.run_without_boundaries()?;
         let sheet = CaseSheet {
             subject: &check.subject,

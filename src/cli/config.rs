@@ -7,10 +7,8 @@ use serde_json::json;
 
 use super::configured::Configured;
 use super::shell::{Completions, Man};
-use super::{Exit, Output, console};
-use crate::settings::{
-    Assignment, DEFAULT_FILE, DEFAULT_FILE_NAME, Layers, Setting, profile_schema, settings_schema, text_of,
-};
+use super::{Output, console};
+use crate::settings::{DEFAULT_FILE, DEFAULT_FILE_NAME, Layers, Setting, profile_schema, settings_schema, text_of};
 use lanesweep_model::profile::Profile;
 use lanesweep_report::records::document;
 use lanesweep_support::files::write_atomically;
@@ -119,8 +117,7 @@ impl Config {
 impl Init {
     fn run(&self) -> Result<Output> {
         if self.file == Path::new("-") {
-            console::print(DEFAULT_FILE)?;
-            return Ok(Exit::Ok.into());
+            return console::answer(DEFAULT_FILE);
         }
         if self.file.exists() {
             let help = "choose another name, or move it away; `lanesweep config init -` prints the file";
@@ -137,9 +134,7 @@ impl Init {
         let (flag, text) = profile.map_or(("config", DEFAULT_FILE), |(_, text)| ("profile", text));
         write_atomically(&self.file, text.as_bytes())?;
         let file = self.file.display().to_string();
-        let text = format!("{file} written; use it with --{flag} {}\n", quoted_word(&file));
-        console::print(&text)?;
-        Ok(Exit::Ok.into())
+        console::answer(&format!("{file} written; use it with --{flag} {}\n", quoted_word(&file)))
     }
 }
 
@@ -148,28 +143,25 @@ impl Show {
         // Only the profile can check its own time step.
         configured.profile()?;
         configured.backend()?;
-        let shown: Vec<Setting> = match self.changed {
+        let shown: Vec<&Setting> = match self.changed {
             true => configured.layers.given().collect(),
-            false => configured.layers.list().collect(),
+            false => configured.layers.0.iter().collect(),
         };
-        let text = match self.format {
+        console::answer(&match self.format {
             ShowFormat::Text => table(&shown),
             ShowFormat::Json => json_list(&shown)?,
             ShowFormat::Toml => toml_file(&shown),
-        };
-        console::print(&text)?;
-        Ok(Exit::Ok.into())
+        })
     }
 }
 
 impl Check {
     fn run(&self) -> Result<Output> {
-        let layers = Layers::read(&[Assignment::File(self.file.clone())], None)?;
+        let mut layers = Layers::defaults();
+        layers.read_file(&self.file)?;
         layers.settings()?;
         let count = layers.given().count();
-        let text = format!("{}: {count} keys set, all of them known and in range\n", self.file.display());
-        console::print(&text)?;
-        Ok(Exit::Ok.into())
+        console::answer(&format!("{}: {count} keys set, all of them known and in range\n", self.file.display()))
     }
 }
 
@@ -179,26 +171,25 @@ impl Schema {
             SchemaOf::Config => settings_schema(),
             SchemaOf::Profile => profile_schema()?,
         };
-        console::print(&format!("{schema:#}\n"))?;
-        Ok(Exit::Ok.into())
+        console::answer(&format!("{schema:#}\n"))
     }
 }
 
 fn value(setting: &Setting) -> String {
-    setting.value.map_or("-".to_owned(), text_of)
+    setting.value.as_ref().map_or("-".to_owned(), text_of)
 }
 
-fn table(shown: &[Setting]) -> String {
-    let width = |of: &dyn Fn(&Setting) -> usize| shown.iter().map(of).max().unwrap_or(0);
+fn table(shown: &[&Setting]) -> String {
+    let width = |of: &dyn Fn(&&Setting) -> usize| shown.iter().map(of).max().unwrap_or(0);
     let keys = width(&|setting| setting.key.name.len());
     let values = width(&|setting| value(setting).len());
     let line =
-        |setting: &Setting| format!("{:keys$}  {:values$}  {}\n", setting.key.name, value(setting), setting.origin);
+        |setting: &&Setting| format!("{:keys$}  {:values$}  {}\n", setting.key.name, value(setting), setting.origin);
     shown.iter().map(line).collect()
 }
 
-fn json_list(shown: &[Setting]) -> Result<String> {
-    let object = |setting: &Setting| {
+fn json_list(shown: &[&Setting]) -> Result<String> {
+    let object = |setting: &&Setting| {
         json!({
             "key": setting.key.name,
             "value": setting.value,
@@ -209,11 +200,11 @@ fn json_list(shown: &[Setting]) -> Result<String> {
     document(&shown.iter().map(object).collect::<Vec<_>>())
 }
 
-fn toml_file(shown: &[Setting]) -> String {
+fn toml_file(shown: &[&Setting]) -> String {
     let (mut text, mut table) = (String::new(), "");
     for setting in shown {
         let (of, name) = setting.key.name.rsplit_once('.').unwrap_or(("", &setting.key.name));
-        let Some(value) = setting.value else { continue };
+        let Some(value) = &setting.value else { continue };
         if of != table {
             let gap = if text.is_empty() { "" } else { "\n" };
             text += &format!("{gap}[{of}]\n");

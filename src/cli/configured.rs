@@ -1,25 +1,22 @@
 //! From the command line to a configuration: which flag sets which key. Verbs read the values of these flags from the
 //! settings. `--backend` and `--device` determine the opened backend.
 
-use std::collections::BTreeSet;
 use std::time::Instant;
 
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, FromArgMatches};
 use indicatif::ProgressBar;
+use tracing::Level;
 
-use super::console::{self, Total, Verbosity};
+use super::console;
 use super::help::RUN;
 use super::signals::CANCEL;
 use super::{COMMIT, Cli, Verb};
-use crate::settings::{
-    Assignment, FILE_VARIABLE, Key, KeyFlag, KeyKind, Layers, Origin, Setting, Settings, keys_in_order,
-};
+use crate::settings::{FILE_VARIABLE, Key, KeyFlag, KeyKind, Layers, Origin, Setting, Settings, keys_in_order};
 use lanesweep_engine::{BackendChoice, Executor, OpenBackend};
 use lanesweep_model::profile::Profile;
 use lanesweep_report::host::{Host, SettingRecord};
-use lanesweep_support::plain_text::nearest;
 use lanesweep_support::{Error, Place, Result, option};
 
 /// The configuration of a run, and what every verb needs besides.
@@ -32,7 +29,7 @@ pub(super) struct Configured {
     /// The command line or call, for repeating the run.
     pub command: String,
     /// What stderr shows.
-    pub verbosity: Verbosity,
+    pub level: Level,
     started: Instant,
 }
 
@@ -163,7 +160,7 @@ impl Configured {
         let unread = |e: clap::Error| Error::Internal(format!("the command line cannot be read: {e}"));
         let mut cli = Cli::from_arg_matches(matches).map_err(unread)?;
         let (path, typed, last) = verb_of(matches);
-        let mut layers = if reads_configuration(&path) { layers(&typed)? } else { Layers::defaults() };
+        let mut layers = if reads_configuration(&path) { Layers::read(&typed)? } else { Layers::defaults() };
         let verb = path.last().unwrap_or(&"");
         let keys = Key::all();
         for (key, KeyFlag { name, .. }) in flags_of(&keys, "lanesweep").chain(flags_of(&keys, verb)) {
@@ -173,21 +170,16 @@ impl Configured {
                 layers.flag(&key.name, &option(name), &word.to_string_lossy())?;
             }
         }
-        let configured = Configured::combined(layers, command, cli.common.verbosity())?;
-        if let Verb::Sample(sample) = &mut cli.verb {
-            sample.settings = configured.settings.sample.clone();
-        }
-        Ok((cli, configured))
-    }
-
-    fn combined(layers: Layers, command: String, verbosity: Verbosity) -> Result<Configured> {
-        let mut settings = layers.settings()?;
+        let (mut settings, level) = (layers.settings()?, cli.common.level());
         let layer = |key: &str| layers.get(key).map_or(0, |setting| setting.origin.layer());
         // A backend without devices overrides a device of an earlier source.
         if settings.run.backend == BackendChoice::Cpu && layer("run.backend") > layer("run.device") {
             settings.run.device = None;
         }
-        Ok(Configured { settings, layers, command, verbosity, started: Instant::now() })
+        if let Verb::Sample(sample) = &mut cli.verb {
+            sample.settings = settings.sample.clone();
+        }
+        Ok((cli, Configured { settings, layers, command, level, started: Instant::now() }))
     }
 
     /// The profile with its time step.
@@ -210,7 +202,7 @@ impl Configured {
 
     /// Adds the file or assignment that sets the key to an error about an option.
     fn at_origin(&self, key: &str, option: &'static str, error: Error) -> Error {
-        let origin = self.layers.get(key).map(|setting| setting.origin);
+        let origin = self.layers.get(key).map(|setting| &setting.origin);
         match (error, origin) {
             (error, None | Some(Origin::Default | Origin::Flag(_))) => error,
             (Error::Usage { place, problem, help }, Some(origin)) if place.option == Some(option) => {
@@ -227,12 +219,12 @@ impl Configured {
 
     /// All settings, for the record of a run; without those that a plan file decides, if one was given.
     pub(super) fn record(&self, has_plan: bool) -> Vec<SettingRecord> {
-        let record = |setting: Setting| SettingRecord {
+        let record = |setting: &Setting| SettingRecord {
             key: setting.key.name.clone(),
-            value: setting.value.cloned().unwrap_or_default(),
+            value: setting.value.clone().unwrap_or_default(),
             source: setting.origin.to_string(),
         };
-        self.layers.list().filter(|setting| !(has_plan && is_of_plan(&setting.key.name))).map(record).collect()
+        self.layers.0.iter().filter(|setting| !(has_plan && is_of_plan(&setting.key.name))).map(record).collect()
     }
 
     /// The record of the host, at the end of the run.
@@ -246,11 +238,11 @@ impl Configured {
     /// Those of the work.
     pub(super) fn with_bar<T>(
         &self,
-        units: Total,
+        units: u64,
         what: &str,
         work: impl FnOnce(&ProgressBar) -> Result<T>,
     ) -> Result<T> {
-        let bar = console::progress(self.verbosity, units, what);
+        let bar = console::progress(self.level, units, what);
         let done = work(&bar);
         bar.finish_and_clear();
         done
@@ -262,7 +254,7 @@ impl Configured {
     /// Those of the work.
     pub(super) fn with_progress<T>(
         &self,
-        units: Total,
+        units: u64,
         what: &str,
         executor: &Executor,
         work: impl FnOnce(&Executor) -> Result<T>,
@@ -284,71 +276,22 @@ impl Configured {
         )
     }
 
-    /// Refuses `--config KEY=VALUE` about lanes where `why` says that it has no effect. Files are allowed, because
+    /// Refuses `--config KEY=VALUE` about lanes where `why` says that it has no effect. Files may be allowed, because
     /// other commands share them.
     ///
     /// # Errors
     /// [`Error::Usage`].
-    pub(super) fn refuse_assigned(&self, why: &str, help: &str) -> Result<()> {
-        self.refuse_lane_keys(false, why, help)
-    }
-
-    fn refuse_lane_keys(&self, are_files_refused: bool, why: &str, help: &str) -> Result<()> {
+    pub(super) fn refuse_lane_keys(&self, are_files_refused: bool, why: &str, help: &str) -> Result<()> {
         let is_refused = |origin: &Origin| match origin {
             Origin::Assignment(_) => true,
             Origin::File { .. } => are_files_refused,
             _ => false,
         };
-        match self.layers.given().find(|setting| is_refused(setting.origin) && is_of_plan(&setting.key.name)) {
-            None => Ok(()),
-            Some(Setting { key, origin, .. }) => {
-                Err(Error::usage(origin.place(&key.name), format!("`{}` {why}", key.name), help))
-            }
-        }
+        let mut refused = self.layers.given().filter(|of| is_refused(&of.origin) && is_of_plan(&of.key.name));
+        refused.next().map_or(Ok(()), |Setting { key, origin, .. }| {
+            Err(Error::usage(origin.place(&key.name), format!("`{}` {why}", key.name), help))
+        })
     }
-}
-
-/// The layers of `--config` and of the variable that names a file.
-///
-/// # Errors
-/// As [`Layers::read`]; [`Error::Usage`] for a text that is neither a file nor an assignment.
-fn layers(typed: &[Assignment]) -> Result<Layers> {
-    // A missing file is named by the system's error if its name says that a file is meant.
-    let is_neither = |one: &&Assignment| match one {
-        Assignment::File(path) => !path.exists() && path.extension().is_none_or(|ending| ending != "toml"),
-        Assignment::Value(_) => false,
-    };
-    if let Some(Assignment::File(path)) = typed.iter().find(is_neither) {
-        let problem = format!("`{}` is neither KEY=VALUE nor an existing file", path.display());
-        let help = "write a key with its value, such as run.dt_s=0.05, or the path of a TOML file";
-        return Err(Error::usage(Place::option("config"), problem, help));
-    }
-    check_variables(&Key::all())?;
-    let file = std::env::var_os(FILE_VARIABLE).filter(|file| !file.is_empty());
-    if let Some(file) = file.as_ref().filter(|_| !typed.iter().any(|one| matches!(one, Assignment::File(_)))) {
-        tracing::info!("configuration of {FILE_VARIABLE}: {}", file.display());
-    }
-    Layers::read(typed, file.as_deref())
-}
-
-/// Looks for variables that would be ignored silently: those of keys, which earlier versions read, and misspellings of
-/// [`FILE_VARIABLE`].
-///
-/// # Errors
-/// [`Error::Usage`] for a misspelling.
-fn check_variables(keys: &[Key]) -> Result<()> {
-    let names: BTreeSet<String> = std::env::vars_os().filter_map(|(name, _)| name.into_string().ok()).collect();
-    for name in names.iter().filter(|name| *name != FILE_VARIABLE) {
-        let Some(rest) = name.strip_prefix("LANESWEEP_") else { continue };
-        if let Some(key) = keys.iter().find(|key| key.name.replace('.', "_").eq_ignore_ascii_case(rest)) {
-            let config = option(&format!("config = {}=VALUE", key.name));
-            tracing::warn!("the variable {name} is not read: write {config}, or a file");
-        } else if nearest(rest, FILE_VARIABLE.strip_prefix("LANESWEEP_"), 0.85).is_some() {
-            let help = format!("did you mean `{FILE_VARIABLE}`, which names a configuration file?");
-            return Err(Error::usage(Place::item(name.clone()), "there is no such variable", help));
-        }
-    }
-    Ok(())
 }
 
 /// Whether a verb reads the configuration.
@@ -357,10 +300,10 @@ fn reads_configuration(path: &[&str]) -> bool {
 }
 
 /// The verb and its subverb, the values of `--config` before and after them, and the matches of the last one.
-fn verb_of(matches: &ArgMatches) -> (Vec<&str>, Vec<Assignment>, &ArgMatches) {
+fn verb_of(matches: &ArgMatches) -> (Vec<&str>, Vec<&str>, &ArgMatches) {
     let (mut path, mut typed, mut last) = (Vec::new(), Vec::new(), matches);
     loop {
-        typed.extend(last.get_many::<String>("config").into_iter().flatten().map(|text| Assignment::of(text)));
+        typed.extend(last.get_many::<String>("config").into_iter().flatten().map(String::as_str));
         let Some((name, inner)) = last.subcommand() else { return (path, typed, last) };
         path.push(name);
         last = inner;

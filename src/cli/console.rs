@@ -14,7 +14,7 @@ use tracing::{Level, Metadata};
 use tracing_subscriber::fmt::MakeWriter;
 use tracing_subscriber::fmt::format::debug_fn;
 
-use super::Exit;
+use super::{Exit, Output};
 use lanesweep_report::tables::WIDTH;
 use lanesweep_support::plain_text::{cut, cut_names, quoted_word, shown, shown_in_line, shown_json};
 use lanesweep_support::readable::count;
@@ -22,17 +22,6 @@ use lanesweep_support::{Error, Place, Result};
 
 /// Name of standard output in errors.
 const STDOUT: &str = "standard output";
-
-/// Verbosity on stderr.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Verbosity {
-    /// Errors only.
-    Quiet,
-    /// Progress and warnings.
-    Normal,
-    /// Everything.
-    Verbose,
-}
 
 /// What a run inside another program says while it works, until its owner takes it.
 #[derive(Debug, Default)]
@@ -91,12 +80,7 @@ impl MakeWriter<'_> for Log {
 }
 
 /// Starts the log. Colours only on a terminal and without `NO_COLOR`.
-pub(super) fn start_log(verbosity: Verbosity) {
-    let level = match verbosity {
-        Verbosity::Quiet => Level::ERROR,
-        Verbosity::Normal => Level::INFO,
-        Verbosity::Verbose => Level::DEBUG,
-    };
+pub(super) fn start_log(level: Level) {
     // A second start (a test in the same process) keeps the first log.
     let _ = tracing_subscriber::fmt()
         .with_writer(Log)
@@ -128,6 +112,12 @@ pub(super) fn print(text: &str) -> Result<()> {
     write_out(&shown(text))
 }
 
+/// Writes the text that is a verb's whole answer.
+pub(super) fn answer(text: &str) -> Result<Output> {
+    print(text)?;
+    Ok(Exit::Ok.into())
+}
+
 /// Writes JSON or JSON Lines to stdout.
 pub(super) fn print_json(json: &str) -> Result<()> {
     write_out(&shown_json(json))
@@ -156,15 +146,6 @@ pub(super) fn command_line(words: &[OsString]) -> String {
     format!("lanesweep {}", words.collect::<Vec<_>>().join(" "))
 }
 
-/// Number of units of the work that a bar shows.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Total {
-    /// The work has this number of units.
-    Exact(u64),
-    /// The work may end earlier.
-    AtMost(u64),
-}
-
 /// Returns a callback that advances a bar.
 pub(super) fn inc(bar: &ProgressBar) -> impl Fn(u64) + Send + Sync + 'static {
     let bar = bar.clone();
@@ -172,30 +153,26 @@ pub(super) fn inc(bar: &ProgressBar) -> impl Fn(u64) + Send + Sync + 'static {
 }
 
 /// A progress bar on stderr, or a line now and then if stderr is no terminal. Its remaining time follows from the units per time.
-pub(super) fn progress(verbosity: Verbosity, units: Total, what: &str) -> ProgressBar {
-    let (length, bound) = match units {
-        Total::Exact(units) => (units, "about"),
-        Total::AtMost(units) => (units, "at most about"),
-    };
-    let bar = ProgressBar::new(length);
+pub(super) fn progress(level: Level, units: u64, what: &str) -> ProgressBar {
+    let bar = ProgressBar::new(units);
     let is_terminal = io::stderr().is_terminal();
-    if verbosity == Verbosity::Quiet || !is_terminal {
+    if level == Level::ERROR || !is_terminal {
         bar.set_draw_target(ProgressDrawTarget::hidden());
     }
     if let Ok(style) = ProgressStyle::with_template("{msg:24} {wide_bar} {pos}/{len} {elapsed}{left}") {
-        bar.set_style(style.with_key("left", move |state: &ProgressState, out: &mut dyn fmt::Write| {
+        bar.set_style(style.with_key("left", |state: &ProgressState, out: &mut dyn fmt::Write| {
             let measured = (state.pos() > 0).then(|| state.elapsed());
             // A bar that cannot be drawn is no error of the run.
-            let _ = out.write_str(&remaining(bound, measured.unwrap_or_default(), state.eta()));
+            let _ = out.write_str(&remaining(measured.unwrap_or_default(), state.eta()));
         }));
     }
     bar.set_message(what.to_owned());
     if let Some(captured) = captured().as_mut() {
         bar.set_draw_target(ProgressDrawTarget::hidden());
         captured.bar = Some(bar.clone());
-    } else if verbosity != Verbosity::Quiet && !is_terminal {
+    } else if level != Level::ERROR && !is_terminal {
         let weak = bar.downgrade();
-        let tell = move || tell_at_intervals(&weak, bound, BETWEEN_LINES, |line| tracing::info!("{line}"));
+        let tell = move || tell_at_intervals(&weak, BETWEEN_LINES, |line| tracing::info!("{line}"));
         // A system without another thread hears nothing on the way.
         let _ = std::thread::Builder::new().spawn(tell);
     }
@@ -206,7 +183,7 @@ pub(super) fn progress(verbosity: Verbosity, units: Total, what: &str) -> Progre
 const BETWEEN_LINES: Duration = Duration::from_secs(60);
 
 /// Tells the state of a bar at intervals until it is finished or dropped.
-fn tell_at_intervals(bar: &WeakProgressBar, bound: &str, interval: Duration, tell: impl Fn(String)) {
+fn tell_at_intervals(bar: &WeakProgressBar, interval: Duration, tell: impl Fn(String)) {
     let mut due = Instant::now() + interval;
     loop {
         // Short naps: the thread ends soon after its bar.
@@ -214,13 +191,13 @@ fn tell_at_intervals(bar: &WeakProgressBar, bound: &str, interval: Duration, tel
         let Some(bar) = bar.upgrade().filter(|bar| !bar.is_finished()) else { return };
         if Instant::now() >= due {
             due += interval;
-            tell(line_of(&bar, bound));
+            tell(line_of(&bar));
         }
     }
 }
 
 /// `sweeping: 1,200 of 9,600 (12 %) in 2 minutes, about 15 minutes left`.
-fn line_of(bar: &ProgressBar, bound: &str) -> String {
+fn line_of(bar: &ProgressBar) -> String {
     let (done, all, elapsed) = (bar.position(), bar.length().unwrap_or_default(), bar.elapsed());
     let parts = done as f64 / all.max(1) as f64;
     // At the mean speed so far.
@@ -232,7 +209,7 @@ fn line_of(bar: &ProgressBar, bound: &str) -> String {
         count(all),
         100.0 * parts,
         HumanDuration(elapsed),
-        remaining(bound, elapsed, left)
+        remaining(elapsed, left)
     )
 }
 
@@ -240,10 +217,10 @@ fn line_of(bar: &ProgressBar, bound: &str) -> String {
 const MIN_MEASURED: Duration = Duration::from_secs(3);
 
 /// The remaining time in words; empty before enough is measured. Indicatif's estimate is 0 where it has none.
-fn remaining(bound: &str, measured: Duration, left: Duration) -> String {
+fn remaining(measured: Duration, left: Duration) -> String {
     match measured < MIN_MEASURED || left.is_zero() {
         true => String::new(),
-        false => format!(", {bound} {:#} left", HumanDuration(left)),
+        false => format!(", about {:#} left", HumanDuration(left)),
     }
 }
 
@@ -273,7 +250,8 @@ pub(super) fn complain(error: &Error) {
     }
     let part = |text: &str| unbroken(&shown(text));
     let _ = miette::set_hook(Box::new(|_| Box::new(miette::MietteHandlerOpts::new().break_words(false).build())));
-    let report = Diagnostic { text: part(&error.to_string()), help: error.help().map(|help| part(&help)) };
+    let mut report = miette::MietteDiagnostic::new(part(&error.to_string()));
+    report.help = error.help().map(|help| part(&help));
     let back = |c: char| (c as u32).checked_sub(WHOLE).and_then(char::from_u32).unwrap_or(c);
     let report: String = format!("{:?}", miette::Report::new(report)).chars().map(back).collect();
     // Ignore a closed stderr: no message can be shown.
@@ -326,18 +304,4 @@ fn verbs_with(flag: &str) -> Vec<String> {
     let Some(flag) = flag.strip_prefix("--") else { return Vec::new() };
     let has = |verb: &&clap::Command| verb.get_arguments().any(|arg| arg.get_long() == Some(flag));
     super::configured::command().get_subcommands().filter(has).map(|verb| verb.get_name().to_owned()).collect()
-}
-
-/// Adapts a library error for miette.
-#[derive(Debug, thiserror::Error)]
-#[error("{text}")]
-struct Diagnostic {
-    text: String,
-    help: Option<String>,
-}
-
-impl miette::Diagnostic for Diagnostic {
-    fn help<'a>(&'a self) -> Option<Box<dyn std::fmt::Display + 'a>> {
-        self.help.as_ref().map(|help| Box::new(help) as Box<dyn std::fmt::Display>)
-    }
 }

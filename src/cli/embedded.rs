@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 
 pub use super::arguments::{Given, described};
 use super::configured::Configured;
-use super::console::{self, Verbosity};
+use super::console;
 use super::signals::CANCEL;
 use super::{Output, not_started, pool_of, without_panic};
 use lanesweep_support::cancel::Cancel;
@@ -56,7 +56,7 @@ fn alone<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
     };
     CANCEL.withdraw();
     console::captured().get_or_insert_default();
-    console::start_log(Verbosity::Normal);
+    console::start_log(tracing::Level::INFO);
     work()
 }
 

@@ -39,45 +39,26 @@ pub enum Exit {
 }
 
 impl Exit {
-    /// All codes, for documentation.
-    pub const ALL: [Exit; 13] = [
-        Exit::Ok,
-        Exit::NotPreventable,
-        Exit::Usage,
-        Exit::BadInput,
-        Exit::Incomplete,
-        Exit::VerificationFailed,
-        Exit::Io,
-        Exit::NoDevice,
-        Exit::Undecided,
-        Exit::NoConflict,
-        Exit::OutsideAnnex,
-        Exit::Internal,
-        Exit::Interrupted,
+    /// All codes with their meanings, for documentation.
+    pub const ALL: [(Exit, &str); 13] = [
+        (Exit::Ok, "done; the checked case is preventable (check)"),
+        (Exit::NotPreventable, "the checked case is not preventable (check)"),
+        (Exit::Usage, "invalid flag, key or profile; nothing was done"),
+        (Exit::BadInput, "invalid data; nothing was written"),
+        (Exit::Incomplete, "a result was written, but parts of the input were left out"),
+        (Exit::VerificationFailed, "a check failed"),
+        (Exit::Io, "the system refused to read, to write, to start a thread or to give memory"),
+        (Exit::NoDevice, "no usable device, or the device failed"),
+        (Exit::Undecided, "the answer is undecided (check)"),
+        (Exit::NoConflict, "the checked case has no conflict: nothing to prevent (check)"),
+        (Exit::OutsideAnnex, "Annex 3 of UN R157 does not describe the checked case (check)"),
+        (Exit::Internal, "a program error"),
+        (Exit::Interrupted, "interrupted, or another process uses the folder; the same command resumes"),
     ];
 
     /// The numeric code.
     pub fn code(self) -> u8 {
         self as u8
-    }
-
-    /// Its meaning in a few words.
-    pub fn meaning(self) -> &'static str {
-        match self {
-            Exit::Ok => "done; the checked case is preventable (check)",
-            Exit::NotPreventable => "the checked case is not preventable (check)",
-            Exit::Usage => "invalid flag, key or profile; nothing was done",
-            Exit::BadInput => "invalid data; nothing was written",
-            Exit::Incomplete => "a result was written, but parts of the input were left out",
-            Exit::VerificationFailed => "a check failed",
-            Exit::Io => "the system refused to read, to write, to start a thread or to give memory",
-            Exit::NoDevice => "no usable device, or the device failed",
-            Exit::Undecided => "the answer is undecided (check)",
-            Exit::NoConflict => "the checked case has no conflict: nothing to prevent (check)",
-            Exit::OutsideAnnex => "Annex 3 of UN R157 does not describe the checked case (check)",
-            Exit::Internal => "a program error",
-            Exit::Interrupted => "interrupted, or another process uses the folder; the same command resumes",
-        }
     }
 
     /// Exit statuses after a signal, 128 + the signal's number, with their meanings.
@@ -89,7 +70,7 @@ impl Exit {
 
     /// The table for `--help`.
     pub(crate) fn table() -> String {
-        let ends = Exit::ALL.iter().map(|exit| (exit.code(), exit.meaning())).chain(Exit::BY_SIGNAL);
+        let ends = Exit::ALL.map(|(exit, meaning)| (exit.code(), meaning)).into_iter().chain(Exit::BY_SIGNAL);
         let lines = ends.map(|(code, meaning)| format!("  {code:>3}  {meaning}\n"));
         format!("Exit codes:\n{}", lines.collect::<String>())
     }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::configured::Configured;
-use super::console::{self, Total};
+use super::console;
 use super::format::FormatFlag;
 use super::lists;
 use super::source::SourceFlags;
@@ -60,7 +60,7 @@ pub(super) struct Fit {
 impl Fit {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         let config = &configured.settings;
-        let ids = self.ids()?;
+        let ids = self.parameterizations.list(&self.categories.list()?)?;
         let typed = self.exposure.driven()?;
         let options = FitOptions {
             parameterization: config.of_densities(),
@@ -76,7 +76,7 @@ impl Fit {
         let folder = (!self.is_single()).then(|| RunFolder::open(&self.out, None)).transpose()?;
         let mut fitted: Vec<(PathBuf, DensityModel)> = Vec::new();
         let (mut failed, mut complete) = (Vec::new(), collection.problems.is_empty());
-        configured.with_bar(Total::Exact(ids.len() as u64), "fitting", |bar| {
+        configured.with_bar(ids.len() as u64, "fitting", |bar| {
             for (id, file) in ids.iter().zip(files) {
                 let result = DensityModel::fit(*id, &collection.scenarios, &facts, &options);
                 bar.inc(1);
@@ -107,11 +107,6 @@ impl Fit {
         let output = self.format.output(exit, || text(&facts, &fitted), json)?;
         tracing::info!("{} written to {}", counted(fitted.len(), "density file"), self.out.display());
         Ok(output)
-    }
-
-    /// The parameterizations to fit, in the registry's order.
-    fn ids(&self) -> Result<Vec<Parameterization>> {
-        self.parameterizations.list(&self.categories.list()?)
     }
 
     /// One file per density.

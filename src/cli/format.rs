@@ -3,7 +3,10 @@
 use clap::{Args, ValueEnum};
 
 use super::{Exit, Output, console};
+use lanesweep_report::host::Host;
+use lanesweep_report::sampling::SampleReport;
 use lanesweep_report::study::StudyReport;
+use lanesweep_run::sampling::{Sample, SampleResult};
 use lanesweep_support::Result;
 use lanesweep_support::readable::count;
 use lanesweep_support::run_folder::Results;
@@ -50,19 +53,6 @@ impl FormatFlag {
         Ok(exit.into())
     }
 
-    /// Like [`FormatFlag::output`], for results in a folder, which it names.
-    pub(super) fn output_in(
-        self,
-        out: &std::path::Path,
-        exit: Exit,
-        text: impl FnOnce() -> String,
-        json: impl FnOnce() -> Result<String>,
-    ) -> Result<Output> {
-        let output = self.output(exit, text, json)?;
-        tracing::info!("results written to {}", out.display());
-        Ok(output)
-    }
-
     /// Writes the files of a study and prints its answer.
     pub(super) fn study(
         self,
@@ -78,6 +68,16 @@ impl FormatFlag {
         let printed = self.output(exit, answer, || report.json(&files))?;
         tracing::info!("{} files written; start with {}", files.files.len() + 1, page.display());
         Ok(printed.with_tables(|| files.tables))
+    }
+
+    /// Writes the files of a sampling run and prints its answer.
+    pub(super) fn sample(self, sample: &Sample, result: &SampleResult, host: Host, results: Results) -> Result<Output> {
+        let out = results.dir().to_path_buf();
+        let report = SampleReport::of_sample(sample, result, host)?;
+        let files = report.write(results, sample, result)?;
+        let output = self.output(Exit::Ok, || report.text(), || report.json(&files))?;
+        tracing::info!("results written to {}", out.display());
+        Ok(output.with_tables(|| files.tables))
     }
 
     /// The answer about a plan that `--plan-only` wrote.

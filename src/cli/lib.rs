@@ -42,7 +42,7 @@ use std::process::ExitCode;
 
 use clap::{Args, FromArgMatches, Parser, Subcommand};
 use configured::Configured;
-use console::Verbosity;
+use tracing::Level;
 
 use lanesweep_support::error::{Notation, write_options_as};
 use lanesweep_support::input_file::guarded;
@@ -78,13 +78,11 @@ struct Common {
 }
 
 impl Common {
-    fn verbosity(&self) -> Verbosity {
-        if self.quiet {
-            Verbosity::Quiet
-        } else if self.verbose {
-            Verbosity::Verbose
-        } else {
-            Verbosity::Normal
+    fn level(&self) -> Level {
+        match (self.quiet, self.verbose) {
+            (true, _) => Level::ERROR,
+            (false, true) => Level::DEBUG,
+            (false, false) => Level::INFO,
         }
     }
 }
@@ -145,7 +143,7 @@ pub fn main_with(words: &[OsString]) -> Exit {
         Err(error) => return run_and_report(|| console::refuse(&error)),
     };
     if let Ok(common) = Common::from_arg_matches(&matches) {
-        console::start_log(common.verbosity());
+        console::start_log(common.level());
     }
     signals::install();
     run_and_report(|| {

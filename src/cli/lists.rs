@@ -57,10 +57,7 @@ impl ParameterizationsFlag {
     pub(super) fn list(&self, categories: &[Category]) -> Result<Vec<Parameterization>> {
         let of_categories = || Parameterization::ALL.into_iter().filter(|p| categories.contains(&p.category));
         let wanted: Vec<&str> = self.parameterizations.iter().map(|key| key.trim()).collect();
-        let of_all = wanted.iter().filter(|key| **key == "all");
-        let every = of_all.flat_map(|all| of_categories().map(|p| (p.key, *all)));
-        let named = wanted.iter().filter(|key| **key != "all").map(|key| (*key, *key));
-        refuse_repeats(|| Place::option("parameterizations"), every.chain(named))?;
+        refuse_repeats(|| Place::option("parameterizations"), wanted.iter().map(|key| (*key, *key)))?;
         if wanted.is_empty() || wanted.contains(&"all") {
             return Ok(of_categories().collect());
         }
@@ -125,7 +122,6 @@ impl HeadwaysFlag {
     /// As [`headways`].
     pub(super) fn list(&self) -> Result<Vec<Headway>> {
         match &self.thw[..] {
-            [one] if one.trim() == "paper" => Ok(Headway::paper()),
             [one] if Headway::parse(one.trim()) == Some(Headway::Observed) => Ok(vec![Headway::Observed]),
             list => headways(list),
         }
@@ -204,18 +200,18 @@ pub(super) fn models<'a>(list: impl IntoIterator<Item = &'a str>, option: &'stat
 /// # Errors
 /// [`Error::Usage`] for a value that is not above 0, or a repeated value.
 pub(super) fn headways(list: &[String]) -> Result<Vec<Headway>> {
+    if let [one] = list
+        && one.trim() == "paper"
+    {
+        return Ok(Headway::paper());
+    }
     let parse = |text: &String| {
-        if Headway::parse(text.trim()) == Some(Headway::MinFollowing) {
+        let text = text.trim();
+        if Headway::parse(text) == Some(Headway::MinFollowing) {
             return Ok(Headway::MinFollowing);
         }
-        let text = text.trim();
-        let value = text
-            .strip_suffix('s')
-            .unwrap_or(text)
-            .trim_end()
-            .parse::<f64>()
-            .ok()
-            .filter(|v| v.is_finite() && *v > 0.0 && *v < 1e4);
+        let number = text.strip_suffix('s').unwrap_or(text).trim_end().parse::<f64>().ok();
+        let value = number.filter(|v| *v > 0.0 && *v < 1e4);
         if let Some(value) = value.filter(|value| !Quantity::Headway.is_plausible(*value)) {
             tracing::warn!("{}: {} (used as it is)", option("thw"), Quantity::Headway.describe(value));
         }

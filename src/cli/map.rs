@@ -6,7 +6,6 @@ use std::time::Instant;
 use clap::Args;
 
 use super::configured::Configured;
-use super::console::Total;
 use super::format::FormatFlag;
 use super::settings::MapSettings;
 use super::source::PlausibilityFlag;
@@ -106,7 +105,7 @@ impl Map {
         let opened = configured.open_in(configured.settings.map.reference)?;
         let folder = RunFolder::open(&self.out, "map.json")?;
         let executor = opened.executor().with_recheck(RECHECK_SEED);
-        let (units, started) = (Total::Exact(map.unit_count()), Instant::now());
+        let (units, started) = (map.unit_count(), Instant::now());
         let MapResult { grids, summary } =
             configured.with_progress(units, "sweeping", &executor, |executor| map.run(executor))?;
         let host = Host::of(COMMIT, &opened, summary.rechecked_lanes, started, configured.record(false));

@@ -8,14 +8,16 @@ use super::configured::Configured;
 use super::format::FormatFlag;
 use super::sample_options::guard;
 use super::sample_run::list_failures;
-use super::{COMMIT, Exit, Output};
+use super::{COMMIT, Output};
 use lanesweep_report::host::{Host, Timings};
 use lanesweep_report::lanes::sampled_table;
-use lanesweep_report::sampling::SampleReport;
 use lanesweep_report::study::StudyReport;
 use lanesweep_run::parts::PLAN_FILE;
-use lanesweep_run::{Merged, merge};
+use lanesweep_run::sampling::{ESTIMATE_RECORD, Sample};
+use lanesweep_run::study::{STUDY_RECORD, Study};
+use lanesweep_run::{RunKind, run_kind};
 use lanesweep_support::plain_text::quoted_word;
+use lanesweep_support::run_folder::RunFolder;
 use lanesweep_support::{Error, Place, Result};
 
 /// Merge the parts of a run into its result
@@ -45,30 +47,28 @@ impl Merge {
         let [plan, out] =
             [&self.folder.join(PLAN_FILE), &self.folder].map(|path| quoted_word(&path.display().to_string()));
         let again = |verb: &str, shard| format!("lanesweep {verb} --plan {plan} --shard {shard} --out {out}");
-        let (folder, merged) = merge(&self.folder, &again)?;
-        match merged {
-            Merged::Study(_) if self.failures.is_some() => {
+        match run_kind(&self.folder)? {
+            RunKind::Study if self.failures.is_some() => {
                 let help = "leave it out; `study --rows` writes every lane";
                 Err(Error::usage(Place::option("failures"), "this is a study, not a sampling run", help))
             }
-            Merged::Study(merged) => {
-                let (study, result) = *merged;
+            RunKind::Study => {
+                let folder = RunFolder::open(&self.folder, STUDY_RECORD)?;
+                let (study, result) = Study::merge_parts(&self.folder, &|shard| again("study", shard))?;
                 let (swept, timings) = (&result.summary, Timings::default());
                 let host = Host::of_parts(COMMIT, result.parts, swept.rechecked_lanes);
                 let report = StudyReport::of(&study, &result.counts, None, host, swept, timings)?;
                 self.format.study(&report, folder.results()?, (study.facts().incomplete, false))
             }
-            Merged::Sample(merged) => {
-                let (sample, result) = *merged;
+            RunKind::Sample => {
+                let folder = RunFolder::open(&self.folder, ESTIMATE_RECORD)?;
+                let (sample, result) = Sample::merge_parts(&self.folder, &|shard| again("sample", shard))?;
                 let host = Host::of_parts(COMMIT, result.parts, result.rechecked_lanes);
                 let table = self.failures.as_deref().map(|path| sampled_table(path, &sample)).transpose()?;
                 let table = table.map(|table| list_failures(table, &sample, &result, configured)).transpose()?;
                 let mut results = folder.results()?;
                 table.into_iter().for_each(|table| results.join(table));
-                let report = SampleReport::of_sample(&sample, &result, host)?;
-                let files = report.write(results, &sample, &result)?;
-                let output = self.format.output_in(&self.folder, Exit::Ok, || report.text(), || report.json(&files))?;
-                Ok(output.with_tables(|| files.tables))
+                self.format.sample(&sample, &result, host, results)
             }
         }
     }

@@ -93,7 +93,7 @@ impl Sample {
         match &self.thw.iter().map(|text| text.trim()).collect::<Vec<_>>()[..] {
             ["sampled" | "observed"] => Ok(SampleHeadways::Sampled),
             [] if density.space.has_thw() => Ok(SampleHeadways::Sampled),
-            [] | ["paper"] => Ok(SampleHeadways::Each(Headway::paper())),
+            [] => Ok(SampleHeadways::Each(Headway::paper())),
             _ => Ok(SampleHeadways::Each(lists::headways(&self.thw)?)),
         }
     }

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use super::sample::Sample;
+use super::source::check_lane_table;
 use crate::settings::{Assurance, EstimatorKind};
 use lanesweep_model::driver::ModelId;
-use lanesweep_report::lanes::table_format;
 use lanesweep_run::sampling::{Estimator, SampleHeadways, SampleOptions, read_proposal};
 use lanesweep_stats::density::DensityModel;
 use lanesweep_stats::estimate::{Goal, Search, StopRule};
@@ -88,9 +88,6 @@ const SEARCH_CRUDE: u64 = 20_000;
 /// Maximum number of draws of importance sampling after a search, if none is given.
 const MAX_DRAWS: u64 = 10_000_000;
 
-/// Maximum number of samples of a run that can be split and resumed.
-const MAX_SPLIT: u64 = (1 << 48) - 1;
-
 /// The error for a flag that only crude Monte Carlo has.
 pub(super) fn only_crude(flag: &'static str) -> Error {
     let problem = "this belongs to crude Monte Carlo";
@@ -105,14 +102,8 @@ impl Sample {
         if self.rows.is_some() && !is_crude {
             return Err(only_crude("rows"));
         }
-        if settings.estimator == EstimatorKind::Is {
-            if let Some(samples) = settings.samples.filter(|samples| *samples > MAX_SPLIT) {
-                let help = format!("give at least 1 and at most {MAX_SPLIT}");
-                return Err(Error::usage(Place::option("samples"), format!("{samples} is out of range"), help));
-            }
-            if settings.time_limit_s.is_some() {
-                return Err(only_crude("time_limit"));
-            }
+        if settings.estimator == EstimatorKind::Is && settings.time_limit_s.is_some() {
+            return Err(only_crude("time_limit"));
         }
         let is_split = self.shards.is_part() || self.shards.plan_only;
         if is_split && is_crude && (settings.half_width.is_some() || settings.time_limit_s.is_some()) {
@@ -135,11 +126,8 @@ impl Sample {
     }
 }
 
-/// Checks that a table of lanes replaces no other result.
+/// Checks a table of lanes: that it replaces no other result, nor another table.
 pub(super) fn guard(table: &Path, flag: &'static str, out: &Path, other: Option<&PathBuf>) -> Result<()> {
-    let results = ["estimate.json", "estimates.csv", "convergence.csv", "density.json"];
-    let others: Vec<PathBuf> = results.iter().map(|name| out.join(name)).chain(other.cloned()).collect();
-    super::source::refuse_overwriting(table, &others, flag)?;
-    table_format(table, flag)?;
-    lanesweep_support::files::check_output(table)
+    let results = ["estimate.json", "estimates.csv", "convergence.csv", "density.json"].map(|name| out.join(name));
+    check_lane_table(table, flag, &results.into_iter().chain(other.cloned()).collect::<Vec<_>>())
 }

@@ -3,16 +3,14 @@
 use std::path::PathBuf;
 
 use super::configured::Configured;
-use super::console::Total;
 use super::sample::Sample;
 use super::sample_options::{guard, only_crude};
 use super::signals::CANCEL;
 use super::{Exit, Output};
 use lanesweep_engine::{Chunk, CpuBackend, Executor, LanePlan, OpenBackend};
 use lanesweep_report::lanes;
-use lanesweep_report::sampling::SampleReport;
 use lanesweep_run::parts::{EachChunk, Job, PLAN_FILE};
-use lanesweep_run::sampling::{self, FailingLane, SampleJob, SampleKind, SampleOptions, SampleResult};
+use lanesweep_run::sampling::{self, FailingLane, SampleKind, SampleOptions, SampleResult};
 use lanesweep_stats::density::read_density;
 use lanesweep_stats::estimate::{Search, StopRule};
 use lanesweep_support::atomic_file::StagedFile;
@@ -99,7 +97,7 @@ impl Sample {
         let is_split = self.shards.plan_only || self.shards.is_part();
         let sample = match sample.kind {
             SampleKind::Search(search) => {
-                let units = Total::AtMost(warn_of_long(&sample, &search));
+                let units = warn_of_long(&sample, &search);
                 // The search is kept in the folder, so it needs the folder's lock too.
                 let _folder = (!is_split).then(|| RunFolder::open(&self.out, sampling::ESTIMATE_RECORD)).transpose()?;
                 let found = configured.with_progress(units, "searching", executor, |executor| {
@@ -118,23 +116,8 @@ impl Sample {
         if self.shards.plan_only {
             return self.format.planned(Exit::Ok, sample.lane_count(), &self.out.join(PLAN_FILE));
         }
-        match sample.job()? {
-            SampleJob::Crude(job) => self.run_job(&job, &sample, opened, executor, configured),
-            SampleJob::Weighted(job) => self.run_job(&job, &sample, opened, executor, configured),
-        }
-    }
-
-    /// Executes a job, whole or a shard of it.
-    fn run_job(
-        &self,
-        job: &impl Job<Result = SampleResult>,
-        sample: &sampling::Sample,
-        opened: &OpenBackend,
-        executor: &Executor,
-        configured: &Configured,
-    ) -> Result<Output> {
         // Rows are written during the run, so a run with rows cannot resume.
-        let Some(mut run) = job.open(&self.out, self.shards.shard, self.rows.is_none())? else {
+        let Some(mut run) = sample.open(&self.out, self.shards.shard, self.rows.is_none())? else {
             tracing::info!("this part exists already and is complete");
             return Ok(Exit::Ok.into());
         };
@@ -147,17 +130,13 @@ impl Sample {
         tracing::info!("{} samples{beside} on {}", count(missing), executor.backend.describe());
         let is_empty = run.units().is_empty();
         let rows = self.rows.as_deref().filter(|_| !is_empty);
-        let mut table = rows.map(|path| lanes::sampled_table(path, sample)).transpose()?;
-        let failures = self.failures.as_deref().map(|path| lanes::sampled_table(path, sample)).transpose()?;
-        let units = match sample.options.stop.is_fixed() {
-            true => Total::Exact(missing),
-            false => Total::AtMost(missing),
-        };
+        let mut table = rows.map(|path| lanes::sampled_table(path, &sample)).transpose()?;
+        let failures = self.failures.as_deref().map(|path| lanes::sampled_table(path, &sample)).transpose()?;
         let mut write_chunk = table
             .as_mut()
-            .map(|table| |plan: &LanePlan, chunk: &Chunk| lanes::write_sampled_chunk(table, sample, plan, chunk));
+            .map(|table| |plan: &LanePlan, chunk: &Chunk| lanes::write_sampled_chunk(table, &sample, plan, chunk));
         let each = write_chunk.as_mut().map(|write| write as &mut EachChunk);
-        configured.with_progress(units, "sampling", executor, |executor| run.compute(executor, each))?;
+        configured.with_progress(missing, "sampling", executor, |executor| run.compute(executor, each))?;
         let rows = table.map(TableWriter::stage).transpose()?;
         if self.shards.is_part() {
             rows.map_or(Ok(()), StagedFile::publish)?;
@@ -168,7 +147,7 @@ impl Sample {
         if let Some(half_width) = self.settings.half_width.filter(|_| self.is_refined()) {
             tracing::info!("importance sampling of what is rare");
             let search = self.search(&sample.options.models, &sample.options.headways);
-            let units = Total::AtMost(warn_of_long(sample, &search));
+            let units = warn_of_long(&sample, &search);
             result = configured.with_progress(units, "searching", executor, |executor| {
                 sample.refined(result, &search, half_width, executor)
             })?;
@@ -183,15 +162,13 @@ impl Sample {
                 );
             }
         }
-        let failures = failures.map(|table| list_failures(table, sample, &result, configured)).transpose()?;
+        let failures = failures.map(|table| list_failures(table, &sample, &result, configured)).transpose()?;
         let host = configured.host(opened, result.rechecked_lanes, self.shards.plan.is_some());
         let mut results = run.results()?;
         rows.into_iter().chain(failures).for_each(|table| results.join(table));
-        let report = SampleReport::of_sample(sample, &result, host)?;
-        let files = report.write(results, sample, &result)?;
-        let output = self.format.output_in(&self.out, Exit::Ok, || report.text(), || report.json(&files))?;
+        let output = self.format.sample(&sample, &result, host, results)?;
         run.close()?;
-        Ok(output.with_tables(|| files.tables))
+        Ok(output)
     }
 }
 
@@ -202,14 +179,9 @@ pub(super) fn list_failures(
     result: &SampleResult,
     configured: &Configured,
 ) -> Result<StagedFile> {
-    let samples = match (&result.crude, &sample.kind) {
-        (Some(run), _) => run.tally.samples(),
-        (None, SampleKind::Weighted(weighted)) => weighted.draws.draws,
-        (None, _) => 0,
-    };
     let cpu = CpuBackend::lane_arithmetic();
     let executor = Executor::new(&cpu).with_cancel(CANCEL.clone());
-    configured.with_progress(Total::AtMost(samples), "failing lanes", &executor, |executor| {
+    configured.with_progress(sample.unit_count(), "failing lanes", &executor, |executor| {
         let limit = configured.settings.sample.failures_limit;
         let each = &mut |lane: &FailingLane| lanes::write_failing_lane(&mut table, sample, lane);
         sample.failing_lanes(result, limit, executor, each)

@@ -28,8 +28,7 @@ impl Completions {
         let mut text = Vec::new();
         clap_complete::generate(self.shell, &mut command(), "lanesweep", &mut text);
         let text = String::from_utf8(text).map_err(|e| Error::Internal(format!("completions are no text: {e}")))?;
-        console::print(&text)?;
-        Ok(Exit::Ok.into())
+        console::answer(&text)
     }
 }
 

@@ -4,17 +4,17 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::case_flags::{CaseFlags, GivenCase, from_table, from_toml, time_s};
+use super::case_flags::{GivenCase, from_table, from_toml, time_s};
 use super::configured::Configured;
-use super::console::{self, Verbosity};
+use super::console;
 use super::format::FormatFlag;
-use super::source::{PlausibilityFlag, scenarios_of};
+use super::source::{PlausibilityFlag, check_ending, scenarios_of};
 use super::xosc::{self, XoscFlags};
 use super::{Exit, Output};
 use lanesweep_report::openscenario::{Concrete, PlayOptions, concrete_case};
 use lanesweep_report::trace::TraceReport;
 use lanesweep_run::reopen::{Reopened, TracedLanes};
-use lanesweep_support::files::{check_output, file_name, write_atomically};
+use lanesweep_support::files::{file_name, write_atomically};
 use lanesweep_support::run_folder::is_listed;
 use lanesweep_support::{Error, Place, Result, option};
 
@@ -32,7 +32,7 @@ use lanesweep_support::{Error, Place, Result, option};
                   lanesweep simulate --scenarios scenarios.jsonl --lane 01_cut_in_97_91_957/S/1.2s/RSS --xosc played")]
 pub(super) struct Simulate {
     #[command(flatten)]
-    case: CaseFlags,
+    case: GivenCase,
     /// TOML file with the case
     #[arg(long, value_name = "FILE", conflicts_with = "table", help_heading = "Data")]
     case_file: Option<PathBuf>,
@@ -90,7 +90,7 @@ impl Simulate {
         self.xosc.write(&played)?;
         let exit = if incomplete { Exit::Incomplete } else { Exit::Ok };
         let output = self.format.output(exit, || report.csv(), || report.json())?;
-        if configured.verbosity != Verbosity::Quiet {
+        if configured.level != tracing::Level::ERROR {
             console::say(&report.text());
         }
         Ok(output.with_tables(|| report.tables()))
@@ -125,7 +125,7 @@ impl Simulate {
         };
         let reopened = match (&self.from, &self.scenarios) {
             (Some(dir), scenarios) => {
-                configured.refuse_assigned(&format!("is decided by the run ({from})"), "leave it out")?;
+                configured.refuse_lane_keys(false, &format!("is decided by the run ({from})"), "leave it out")?;
                 let reopened = Reopened::run(dir, key)?;
                 if scenarios.is_some() && reopened.as_study().is_none() {
                     let problem = "sampled lanes have the mean sizes of their density".to_owned();
@@ -172,11 +172,6 @@ impl Simulate {
             let problem = format!("{until} s is out of range for a time axis");
             return Err(Error::usage(Place::option("plot_end"), problem, "give seconds above 0 and below 10^9"));
         }
-        if plot.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("svg")) {
-            let problem = format!("{} is not the name of an SVG file", plot.display());
-            let help = "give a name that ends in .svg; `rsvg-convert` makes PNG and PDF of it";
-            return Err(Error::usage(Place::option("plot"), problem, help));
-        }
         let is_of_run = |dir: &Path| {
             plot.parent().map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p }) == Some(dir)
                 && plot.file_name().and_then(|name| name.to_str()).is_some_and(|name| is_listed(dir, name))
@@ -185,6 +180,6 @@ impl Simulate {
             let problem = format!("{} is a result of the run", plot.display());
             return Err(Error::usage(Place::option("plot"), problem, "choose another name"));
         }
-        check_output(plot)
+        check_ending(plot, "svg", "plot")
     }
 }

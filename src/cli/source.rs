@@ -6,10 +6,12 @@ use clap::Args;
 use indicatif::ProgressBar;
 
 use super::configured::Configured;
-use super::console::{self, Total};
+use super::console;
 use super::signals::CANCEL;
 use lanesweep_model::plausibility::Implausible;
 use lanesweep_model::scenario::{DataProvenance, Driven, Scenario, ScenarioFile, read_scenario_file};
+use lanesweep_report::lanes::table_format;
+use lanesweep_support::files::check_output;
 use lanesweep_support::input_file::canonical;
 use lanesweep_support::{Error, Place, Result, option};
 use lanesweep_traffic::Source;
@@ -22,7 +24,7 @@ use lanesweep_traffic::mining::{Collection, counts, counts_text};
 /// As [`Source::load`].
 pub(super) fn load(source: &Source, configured: &Configured, implausible: Implausible) -> Result<Collection> {
     let what = if matches!(source, Source::Generated(_)) { "generating and mining" } else { "reading and mining" };
-    let collection = configured.with_bar(Total::Exact(source.recordings()), what, |bar| {
+    let collection = configured.with_bar(source.recordings(), what, |bar| {
         source.load(&configured.settings.mining, implausible, || advance(bar))
     })?;
     complain_of(&collection.problems, &collection.notes);
@@ -169,14 +171,21 @@ pub(super) fn scenarios_of(path: &Path, implausible: Implausible) -> Result<(Vec
     Ok((scenarios, !problems.is_empty()))
 }
 
-/// Refuses an output that is another of the run's outputs.
-pub(super) fn refuse_overwriting(output: &Path, others: &[PathBuf], flag: &'static str) -> Result<()> {
-    match others.iter().find(|other| canonical(other) == canonical(output)) {
-        Some(other) => Err(Error::usage(
-            Place::option(flag),
-            format!("{} would be overwritten: this run writes it", other.display()),
-            "choose another path",
-        )),
-        None => Ok(()),
+/// Checks a table of lanes: its format, its place, and that it replaces none of these files of the run.
+pub(super) fn check_lane_table(table: &Path, flag: &'static str, results: &[PathBuf]) -> Result<()> {
+    if let Some(other) = results.iter().find(|other| canonical(other) == canonical(table)) {
+        let problem = format!("{} would be overwritten: this run writes it", other.display());
+        return Err(Error::usage(Place::option(flag), problem, "choose another path"));
     }
+    table_format(table, flag)?;
+    check_output(table)
+}
+
+/// Checks that a file to write has this ending, and its place.
+pub(super) fn check_ending(path: &Path, ending: &str, flag: &'static str) -> Result<()> {
+    if path.extension().is_none_or(|found| !found.eq_ignore_ascii_case(ending)) {
+        let problem = format!("{} does not end in .{ending}", path.display());
+        return Err(Error::usage(Place::option(flag), problem, format!("give a name that ends in .{ending}")));
+    }
+    check_output(path)
 }

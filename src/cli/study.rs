@@ -6,19 +6,19 @@ use std::time::Instant;
 use clap::Args;
 
 use super::configured::Configured;
-use super::console::{self, Total};
+use super::console;
 use super::format::FormatFlag;
 use super::settings::KeepPlan;
 use super::shard_flags::ShardFlags;
-use super::source::{self, SourceFlags};
+use super::source::{SourceFlags, check_lane_table};
 use super::{COMMIT, Exit, Output, lists};
 use lanesweep_engine::{Chunk, Headway, LanePlan, OpenBackend};
 use lanesweep_report::host::{Host, Timings};
-use lanesweep_report::lanes::{study_table, table_format, write_study_chunk};
+use lanesweep_report::lanes::{study_table, write_study_chunk};
 use lanesweep_report::study::StudyReport;
 use lanesweep_run::parts::{EachChunk, Job, PLAN_FILE, RUN_PLAN_FILE};
 use lanesweep_run::study::{self, ExternalReplay, ReferenceComparison, StudyOptions, StudyResult};
-use lanesweep_support::files::{check_folder, check_output};
+use lanesweep_support::files::check_folder;
 use lanesweep_support::input_file;
 use lanesweep_support::readable;
 use lanesweep_support::run_folder::{Results, RunFolder};
@@ -171,7 +171,7 @@ impl Study {
         let units = run.units();
         let lanes = plan.first_lane_of(units.end) - plan.first_lane_of(units.start);
         tracing::info!("{} runs on {}", readable::count(lanes), backend.describe());
-        let missing = Total::Exact(run.missing()?);
+        let missing = run.missing()?;
         let mut rows = self.rows.as_deref().map(|path| study_table(path, study)).transpose()?;
         let mut write = rows.as_mut().map(|rows| |plan: &LanePlan, chunk: &Chunk| write_study_chunk(rows, plan, chunk));
         timed(&mut timings.sweep_s, || {
@@ -227,12 +227,8 @@ impl Study {
             return Err(Error::usage(Place::item("study.compare_reference"), problem, "leave it out"));
         }
         let Some(lanes) = &self.rows else { return Ok(()) };
-        let results = ["results.csv", "run.json"];
-        let results = results.into_iter().chain([PLAN_FILE, RUN_PLAN_FILE]);
-        let others: Vec<PathBuf> = results.map(|name| self.out.join(name)).collect();
-        source::refuse_overwriting(lanes, &others, "rows")?;
-        table_format(lanes, "rows")?;
-        check_output(lanes)
+        let results = ["results.csv", "run.json", PLAN_FILE, RUN_PLAN_FILE].map(|name| self.out.join(name));
+        check_lane_table(lanes, "rows", &results)
     }
 }
 

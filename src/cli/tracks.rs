@@ -8,7 +8,6 @@ use clap::Args;
 use serde::Serialize;
 
 use super::configured::Configured;
-use super::console::Total;
 use super::format::FormatFlag;
 use super::{Exit, Output, source};
 use lanesweep_model::plausibility::Implausible;
@@ -127,7 +126,7 @@ impl Tracks {
         let options = &configured.settings.generator;
         let folder = RunFolder::open(to, SYNTHETIC_MARKER)?;
         let mut results = folder.results()?;
-        configured.with_bar(Total::Exact(options.recordings as u64), "writing recordings", |bar| {
+        configured.with_bar(options.recordings as u64, "writing recordings", |bar| {
             (0..options.recordings).try_for_each(|index| {
                 let staged = highd::stage(to, &generate_one(options, index)?)?;
                 staged.into_iter().for_each(|file| results.add_staged(file));

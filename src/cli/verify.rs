@@ -1,9 +1,9 @@
 //! `lanesweep verify`: checks that a device computes the same as the CPU.
 
-use clap::Args;
+use clap::{Args, value_parser};
 
 use super::configured::Configured;
-use super::console::{self, Total};
+use super::console;
 use super::format::FormatFlag;
 use super::source::SourceFlags;
 use super::{Exit, Output};
@@ -28,7 +28,7 @@ pub(super) struct Verify {
     #[command(flatten)]
     data: SourceFlags,
     /// Random lanes per model and category
-    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = whole, help_heading = "Models and criteria")]
+    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = value_parser!(u64).range(1..=MAX_LANES), help_heading = "Models and criteria")]
     random_lanes: u64,
     /// Seed of the random lanes and of those on thresholds
     #[arg(long, value_name = "N", default_value_t = 157, help_heading = "Run")]
@@ -37,25 +37,11 @@ pub(super) struct Verify {
     format: FormatFlag,
 }
 
-/// Parses an integer as in the configuration: `10000`, `10_000` or `1e4`.
-fn whole(text: &str) -> std::result::Result<u64, String> {
-    let plain = text.replace('_', "");
-    // Above 2^53 a floating-point number no longer identifies one integer.
-    let of_power = |value: &f64| value.fract() == 0.0 && (0.0..9e15).contains(value);
-    let power = || plain.parse().ok().filter(of_power).map(|value| value as u64);
-    let found = plain.parse().ok().or_else(power);
-    found.ok_or_else(|| "write a whole number such as 10000, 10_000 or 1e4".to_owned())
-}
-
 /// Maximum number of random lanes per model and category: their units have individual names.
 const MAX_LANES: u64 = 100_000_000;
 
 impl Verify {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
-        if self.random_lanes == 0 || self.random_lanes > MAX_LANES {
-            let problem = format!("{} is not usable; expected 1 to {MAX_LANES}", self.random_lanes);
-            return Err(Error::usage(Place::option("random_lanes"), problem, "choose a number in this range"));
-        }
         let profile = configured.profile()?;
         let opened = configured.open_to_verify()?;
         let tested = opened.backend();
@@ -72,9 +58,8 @@ impl Verify {
             ("Lanes on thresholds", threshold_plan(&profile, &set(configured.settings.verify.threshold_units))?),
             ("Study", self.study(configured, &profile)?),
         ] {
-            let comparison = configured.with_bar(Total::Exact(plan.lane_count()), name, |bar| {
-                compare(name, &plan, tested, |lanes| bar.inc(lanes))
-            })?;
+            let comparison = configured
+                .with_bar(plan.lane_count(), name, |bar| compare(name, &plan, tested, |lanes| bar.inc(lanes)))?;
             // Print set by set, so that a later failure of the device keeps earlier results.
             if is_text {
                 console::print(&format!("\n{}", verification::comparison(&comparison)))?;

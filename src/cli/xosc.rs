@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::case_flags::time_s;
 use lanesweep_engine::LaneKey;
@@ -23,29 +24,26 @@ pub(super) struct XoscFlags {
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     xosc: Option<PathBuf>,
     /// Driver of the ego in --xosc
-    #[arg(long, value_enum, default_value_t, requires = "xosc", help_heading = "Output")]
-    ego: EgoFlag,
+    ///
+    /// model: the ego follows the path that the driver model drove. external: your own controller drives the ego; only its
+    /// position and speed at the start are written.
+    #[arg(long, value_parser = ego_motion(), default_value = "model", requires = "xosc", help_heading = "Output")]
+    ego: EgoMotion,
     /// End of the scenario with --ego external [default: 10 s after the lane's last event and end]
     #[arg(long, value_name = "s", requires = "xosc", value_parser = time_s, help_heading = "Output")]
     duration: Option<f64>,
     /// Side in --xosc that the other vehicle comes from or leaves to [default: the scenario's, else left]
-    #[arg(long, value_enum, requires = "xosc", help_heading = "Output")]
-    side: Option<SideFlag>,
+    #[arg(long, value_parser = side(), requires = "xosc", help_heading = "Output")]
+    side: Option<Side>,
 }
 
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
-enum EgoFlag {
-    /// The ego follows the path that the driver model drove
-    #[default]
-    Model,
-    /// Your own controller drives the ego: only its position and speed at the start are written
-    External,
+fn ego_motion() -> impl TypedValueParser<Value = EgoMotion> {
+    let of = |word: String| if word == "external" { EgoMotion::External } else { EgoMotion::Model };
+    PossibleValuesParser::new(["model", "external"]).map(of)
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum SideFlag {
-    Left,
-    Right,
+fn side() -> impl TypedValueParser<Value = Side> {
+    PossibleValuesParser::new(["left", "right"]).map(|word| if word == "right" { Side::Right } else { Side::Left })
 }
 
 impl XoscFlags {
@@ -53,11 +51,7 @@ impl XoscFlags {
     pub(super) fn options(&self, lane_width_m: Option<f64>) -> Result<Option<PlayOptions>> {
         let Some(dir) = &self.xosc else { return Ok(None) };
         let refused = |flag, problem: String, help: &str| Err(Error::usage(Place::option(flag), problem, help));
-        let ego = match self.ego {
-            EgoFlag::Model => EgoMotion::Model,
-            EgoFlag::External => EgoMotion::External,
-        };
-        if self.duration.is_some() && ego == EgoMotion::Model {
+        if self.duration.is_some() && self.ego == EgoMotion::Model {
             let problem = "the ego follows the driver model, and its path ends with the lane".to_owned();
             return refused("duration", problem, &format!("add {}, or leave it out", option("ego = external")));
         }
@@ -70,11 +64,7 @@ impl XoscFlags {
             return refused("lane_width", problem, "give 1 to 20 m, such as 3.5");
         }
         drop(RunFolder::open(dir, INDEX)?);
-        let side = self.side.map(|side| match side {
-            SideFlag::Left => Side::Left,
-            SideFlag::Right => Side::Right,
-        });
-        Ok(Some(PlayOptions { ego, duration_s: self.duration, side, lane_width_m }))
+        Ok(Some(PlayOptions { ego: self.ego, duration_s: self.duration, side: self.side, lane_width_m }))
     }
 
     /// Writes the files, if they are asked for.

@@ -1,11 +1,12 @@
 //! Kinds of scenario.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use lanesweep_support::{Error, Place, Result};
 
 /// The three kinds of scenario of UN R157, Annex 3.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Category {
     /// Another vehicle changes into the ego's lane in front of it.

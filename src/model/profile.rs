@@ -4,6 +4,7 @@
 
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::criterion::CriteriaProfile;
@@ -15,7 +16,7 @@ use lanesweep_support::{Error, Place, Result, input_file, option};
 pub const MAX_STEPS: f64 = 4e6;
 
 /// Which vehicles the ego's driver reacts to in a cut-out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum CutOutTarget {
     /// Both vehicles are checked at each step; the driver reacts to the nearest unsafe one.
@@ -28,7 +29,7 @@ pub enum CutOutTarget {
 }
 
 /// Which vehicles the criteria evaluate in a cut-out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum CutOutEvaluated {
     /// Every other vehicle; the worst value counts (the paper's definition).
@@ -38,7 +39,7 @@ pub enum CutOutEvaluated {
 }
 
 /// The frame around the models.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FrameProfile {
     /// Time step, s.
@@ -73,7 +74,7 @@ impl FrameProfile {
 macro_rules! declare_profile {
     ($($(#[$attribute:meta])* $file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
         /// A profile: all parameters of the lanes' physics that are not part of a case.
-        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[serde(deny_unknown_fields)]
         pub struct Profile {
             /// Name.

@@ -132,7 +132,7 @@ impl CaseSheet<'_> {
         let table = Table::of(finer)
             .column("driver", |((judged, _), _)| judged.trace.model.name())
             .column("collision verdict", |((judged, _), _)| {
-                if judged.flips.contains(&Perturbation::FinerStep.label()) { "CHANGES" } else { "the same" }
+                if judged.flips.contains(&Perturbation::FINER_STEP.label()) { "CHANGES" } else { "the same" }
             })
             .column(column("smallest gap m"), |of| by(of, &|outcome, _| Some(records::smallest_gap_m(outcome))))
             .column(column("smallest TTC s"), |of| by(of, &|outcome, _| outcome.approach_ttc()))

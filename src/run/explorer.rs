@@ -26,7 +26,7 @@ struct Slider {
     from: f64,
     to: f64,
     /// The [`Variable`] of a point that it gives; `None` for an initial distance.
-    variable: Option<String>,
+    variable: Option<Variable>,
 }
 
 /// A kind of case: the parameters of a kinematic parameterization.
@@ -154,10 +154,10 @@ fn generator(
     let (mut slots, mut lower) = ([NO_SLOT; Variable::ALL.len()], [0.0; MAX_PARAMETERS]);
     let mut points = vec![Vec::new(); 2 + KNOWN_CASES];
     let of_kind = kind.parameters.iter().filter_map(|key| sliders.iter().find(|slider| slider.key == *key));
-    for (at, slider) in of_kind.filter(|slider| slider.variable.is_some()).enumerate() {
+    let numbers = of_kind.filter_map(|slider| Some((slider, slider.variable?)));
+    for (at, (slider, variable)) in numbers.enumerate() {
         let parameter = MapParameter::find(category, &slider.key, "page")?;
-        let variable = Variable::ALL.iter().position(|known| slider.variable == Some(format!("{known:?}")));
-        slots[variable.ok_or_else(|| Error::Internal(format!("no variable of {}", slider.key)))?] = at as u32;
+        slots[variable as usize] = at as u32;
         // A speed across the road and a deceleration divide.
         lower[at] = if slider.from > 0.0 { f32::MIN_POSITIVE } else { 0.0 };
         // An end speed is below the initial speed as a rule.

@@ -1,7 +1,7 @@
 //! Runs: what is planned, computed in parts, merged and scored.
 //!
 //! [`study`] compares parameterizations with recordings, [`sampling`] estimates probabilities. [`grid`] sweeps maps, [`cases`] tables of concrete cases, [`check`] evaluates single ones.
-//! [`reopen`] reruns single lanes of a finished run. [`parts`] splits and journals runs, [`Merged`] is the result of merged parts.
+//! [`reopen`] reruns single lanes of a finished run. [`parts`] splits and journals runs.
 //! [`score`] computes recall, precision and F1 from a study's counts.
 
 pub mod cases;
@@ -17,42 +17,33 @@ pub mod study;
 use std::path::Path;
 
 use lanesweep_support::files::check_run_folder;
-use lanesweep_support::run_folder::RunFolder;
 use lanesweep_support::{Error, Place, Result};
-use parts::{PLAN_FILE, Shard, kind_of};
-use sampling::{ESTIMATE_RECORD, Sample, SampleResult};
-use study::{STUDY_RECORD, Study, StudyResult};
+use parts::{PLAN_FILE, kind_of};
+use sampling::{ESTIMATE_RECORD, SAMPLING_PLAN};
+use study::{STUDY_RECORD, Study};
 
-/// A run with the merged result of its parts, bit for bit equal to that of the run in one piece.
-pub enum Merged {
-    /// A study.
-    Study(Box<(Study, StudyResult)>),
-    /// A sampling run.
-    Sample(Box<(Sample, SampleResult)>),
+/// Kinds of runs in parts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RunKind {
+    /// A [`Study`].
+    Study,
+    /// A [`Sample`](sampling::Sample).
+    Sample,
 }
 
-/// Merges the parts of a folder and locks it. `again` returns the command that makes a shard.
+/// The kind of the run whose plan is in a folder.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Busy`] if another process writes there; [`Error::Input`] with the missing, duplicate,
-/// foreign or damaged parts.
-pub fn merge(dir: &Path, again: &dyn Fn(&str, Shard) -> String) -> Result<(RunFolder, Merged)> {
+/// [`Error::Io`]; [`Error::Input`] for a folder without a plan of a run.
+pub fn run_kind(dir: &Path) -> Result<RunKind> {
     check_run_folder(dir)?;
     let plan = dir.join(PLAN_FILE);
     if !plan.exists() {
         return Err(no_parts(dir));
     }
     match kind_of(&plan)?.as_str() {
-        Study::KIND => {
-            let folder = RunFolder::open(dir, STUDY_RECORD)?;
-            let merged = Study::merge_parts(dir, &|shard| again("study", shard))?;
-            Ok((folder, Merged::Study(Box::new(merged))))
-        }
-        kind if Sample::is_kind(kind) => {
-            let folder = RunFolder::open(dir, ESTIMATE_RECORD)?;
-            let merged = Sample::merge_parts(dir, &|shard| again("sample", shard))?;
-            Ok((folder, Merged::Sample(Box::new(merged))))
-        }
+        Study::KIND => Ok(RunKind::Study),
+        SAMPLING_PLAN => Ok(RunKind::Sample),
         other => {
             let help = format!("give the folder ({}) of a run in parts", lanesweep_support::option("out"));
             Err(Error::input(Place::file(plan), format!("this is a `{other}`, not the plan of a run"), help))

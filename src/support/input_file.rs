@@ -246,7 +246,7 @@ pub fn read_json(path: &Path, largest: u64, kind: &str, help: &str) -> Result<Ve
 }
 
 /// The first and last bytes of a file, at most 256 each; afterwards the file is at its beginning.
-pub fn ends(file: &mut File) -> std::io::Result<(Vec<u8>, Vec<u8>)> {
+fn ends(file: &mut File) -> std::io::Result<(Vec<u8>, Vec<u8>)> {
     const BYTES: u64 = 256;
     let length = file.seek(SeekFrom::End(0))?;
     let piece = |file: &mut File, at: u64| {

@@ -26,13 +26,13 @@ fn assert_equal(what: &str, comparison: &Comparison) {
 
 /// The regulation's distance between vehicles, at speeds of every part of its table.
 fn at_the_minimum_following_distance() -> LanePlan {
-    let axis = |key, from, to, step| GridAxis::range(Category::CutIn, key, (from, to), step).unwrap();
+    let axis = |text| GridAxis::parse(Category::CutIn, text, "axis").unwrap();
     let grid = Grid::new(GridParts {
         name: "following".to_owned(),
         category: Category::CutIn,
-        x: axis("ego_speed_kmh", 1.0, 130.0, 3.0),
-        y: axis("lateral_speed_mps", 0.3, 1.8, 0.5),
-        panel_axes: vec![axis("other_speed_kmh", 0.0, 40.0, 20.0)],
+        x: axis("ego_speed_kmh=1..130/3"),
+        y: axis("lateral_speed_mps=0.3..1.8/0.5"),
+        panel_axes: vec![axis("other_speed_kmh=0..40/20")],
         fixed: vec![(MapParameter::find(Category::CutIn, "gap_m", "test").unwrap(), 0.0)],
         style: CaseStyle::Plain,
         native_gap: false,

@@ -243,12 +243,6 @@ fn every_verb_doubts_the_same_values_of_a_table_and_names_their_place() {
             assert!(said.contains(expected), "{expected}: {said}");
         }
     }
-    let [twice, _] = notes(dir, &table(&[good[0], good[1], &good[0].replace("a,", "z,")]));
-    assert!(
-        twice
-            .contains("1 row(s) are equal to another one but for their ids and count again, the first: row 3 is row 1"),
-        "{twice}"
-    );
     // Headways of a flag have no ego.
     file(dir, "t.csv", &table(&good));
     let (_, text) = said(dir, "study --scenarios t.csv --models FSM --backend cpu --thw 1.2,12 --out out");

@@ -62,11 +62,11 @@ fn help_names_every_verb_and_every_exit_code() {
     for word in ["study", "mine", "tracks", "simulate", "verify", "merge", "Exit codes"] {
         assert!(help.contains(word), "{word}");
     }
-    for exit in lanesweep::cli::Exit::ALL {
-        assert!(help.contains(exit.meaning()), "{exit:?}");
+    for (exit, meaning) in lanesweep::cli::Exit::ALL {
+        assert!(help.contains(meaning), "{exit:?}");
     }
     let chapter = include_str!("../../docs/src/tables.md");
-    for code in lanesweep::cli::Exit::ALL.map(|exit| exit.code()).into_iter().chain([129, 130, 143]) {
+    for code in lanesweep::cli::Exit::ALL.map(|(exit, _)| exit.code()).into_iter().chain([129, 130, 143]) {
         assert!(help.lines().any(|line| line.trim_start().starts_with(&format!("{code}  "))), "{code}: {help}");
         assert!(chapter.contains(&format!("\n| {code} | ")), "the chapter on exit codes has no {code}");
     }

@@ -385,10 +385,9 @@ fn bad_input_is_told_with_its_place_and_what_to_do() {
     std::fs::write(dir.join("newer.json"), newer).unwrap();
     std::fs::write(dir.join("cut.json"), &text[..text.len() / 2]).unwrap();
     for (args, code, said) in [
-        ("@ --estimator is --samples 300000000000000", 2, "at least 1 and at most 281474976710655"),
+        ("@ --estimator is --samples 300000000000000", 2, "a whole number from 1 to 281474976710655"),
         ("@ --estimator is --time-limit 3", 2, "belongs to crude Monte Carlo"),
         ("@ --samples 0", 2, "--samples: `0` cannot be used"),
-        ("@ --samples 2000000000000000000", 2, "more than can be counted"),
         ("@ --thw -1", 2, "not a time headway"),
         ("@ --thw sampled", 2, "--with-thw"),
         ("@ --shard 5/5", 2, "no shard 5 of 5"),

@@ -4,7 +4,6 @@
 use crate::common;
 use crate::common::mined::{self, scenarios_of};
 
-use lanesweep::run::sampling::{proposal_from_text, proposal_text};
 use lanesweep::scenario::parameterization::{
     Family, Kinematic, LaneChange, Parameterization, ParameterizationOptions, Reduction, Sizes, SpeedProfile,
     SvdLateral, Variable,
@@ -447,12 +446,4 @@ fn edited_files_say_so_and_other_kinds_are_refused() {
         written.replace("\"kernels\"", "\"mixture\": {\"kind\": \"copula\", \"weights\": [1.0]},\n  \"kernels\"");
     let error = DensityModel::from_json(other.as_bytes(), &place).unwrap_err();
     assert!(error.to_string().contains("unknown field `mixture`"), "{error}");
-
-    // A proposal says of which form its density was.
-    let density = model(Category::CutIn, "1");
-    let proposal = proposal_text(&density, &density.kde.mixture().unwrap()).unwrap();
-    for (form, is_read) in [("kernel", true), ("copula", false)] {
-        let of_form = proposal.replacen('{', &format!("{{\"density_form\": \"{form}\","), 1);
-        assert_eq!(proposal_from_text(of_form.as_bytes(), &density, &place).is_ok(), is_read, "{form}");
-    }
 }

@@ -6,7 +6,7 @@ use serde_json::{Number, Value};
 use toml::de::DeValue;
 
 use super::schema::settings_schema;
-use lanesweep_support::plain_text;
+use lanesweep_support::plain_text::nearest;
 use lanesweep_support::ranges::Range;
 use lanesweep_support::{Error, Place, Result};
 
@@ -69,11 +69,6 @@ impl Key {
         keys
     }
 
-    /// A key by its name.
-    pub(crate) fn find<'a>(keys: &'a [Key], name: &str) -> Option<&'a Key> {
-        keys.iter().find(|key| key.name == name)
-    }
-
     /// The valid values in words: `a number above 0 and at most 1000000`.
     fn expected(&self) -> String {
         match &self.kind {
@@ -86,11 +81,6 @@ impl Key {
             KeyKind::Number(range) => range.to_string(),
         }
     }
-}
-
-/// The name most similar to a wrong one, if any is similar.
-pub(super) fn nearest<'a>(wrong: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    plain_text::nearest(wrong, names, 0.7)
 }
 
 fn collect(schema: &Value, prefix: &str, keys: &mut Vec<Key>) {
@@ -143,7 +133,7 @@ fn kind_of(property: &Value) -> KeyKind {
 /// The error for an invalid value, with what to write instead.
 fn refused(key: &Key, found: &str, place: Place) -> Error {
     let near = match &key.kind {
-        KeyKind::Choice(choices) => nearest(found.trim_matches(['"', '`']), choices.iter().map(|c| c.word.as_str())),
+        KeyKind::Choice(choices) => nearest(found.trim_matches(['"', '`']), choices.iter().map(|c| &*c.word), 0.7),
         _ => None,
     };
     let near = near.map_or(String::new(), |word| format!("did you mean \"{word}\"? "));
@@ -156,14 +146,16 @@ fn refused(key: &Key, found: &str, place: Place) -> Error {
 /// # Errors
 /// [`Error::Usage`] at `place` for an invalid value.
 pub(super) fn from_toml(key: &Key, found: &DeValue, place: Place) -> Result<Value> {
-    let value = match found {
-        DeValue::Boolean(b) => Some(Value::Bool(*b)),
-        DeValue::String(s) => Some(Value::String(s.clone().into_owned())),
-        DeValue::Integer(i) => i128::from_str_radix(i.as_str(), i.radix()).ok().and_then(whole),
-        DeValue::Float(f) => f.as_str().parse().ok().and_then(Number::from_f64).map(Value::Number),
-        DeValue::Datetime(_) | DeValue::Array(_) | DeValue::Table(_) => None,
+    let (value, shown) = match found {
+        DeValue::Boolean(b) => (Some(Value::Bool(*b)), b.to_string()),
+        DeValue::String(s) => (Some(Value::String(s.to_string())), format!("\"{s}\"")),
+        DeValue::Integer(i) => (i128::from_str_radix(i.as_str(), i.radix()).ok().and_then(whole), i.to_string()),
+        DeValue::Float(f) => (f.as_str().parse().ok().and_then(Number::from_f64).map(Value::Number), f.to_string()),
+        DeValue::Datetime(_) => (None, "a date".to_owned()),
+        DeValue::Array(_) => (None, "an array".to_owned()),
+        DeValue::Table(_) => (None, "a table".to_owned()),
     };
-    value.and_then(|value| fitted(key, value)).ok_or_else(|| refused(key, &shown(found), place))
+    value.and_then(|value| fitted(key, value)).ok_or_else(|| refused(key, &shown, place))
 }
 
 /// Converts a text of the command line to a value of a key; it may be in quotes.
@@ -221,45 +213,23 @@ fn fitted(key: &Key, value: Value) -> Option<Value> {
     }
 }
 
-/// The found value as a message shows it.
-fn shown(value: &DeValue) -> String {
-    match value {
-        DeValue::Boolean(b) => b.to_string(),
-        DeValue::String(s) => format!("\"{s}\""),
-        DeValue::Integer(i) => i.to_string(),
-        DeValue::Float(f) => f.to_string(),
-        DeValue::Datetime(_) => "a date".to_owned(),
-        DeValue::Array(_) => "an array".to_owned(),
-        DeValue::Table(_) => "a table".to_owned(),
-    }
-}
-
 /// The default configuration: every key with its default; keys without a default are in comments.
 pub(crate) const DEFAULT_FILE: &str = include_str!("../../../configs/default.toml");
 
 /// Default file name of `lanesweep config init`.
 pub(crate) const DEFAULT_FILE_NAME: &str = "lanesweep.toml";
 
-/// All keys in the order of the default file, which is chosen for readers.
+/// All keys in the order of the default file, which is chosen for readers; keys that are not set are in comments there
+/// (`# threads = 8`).
 pub(crate) fn keys_in_order() -> Vec<Key> {
-    let names: Vec<String> = names(DEFAULT_FILE);
+    let place = |key: &Key| {
+        let (table, name) = key.name.rsplit_once('.').unwrap_or_default();
+        let begin = DEFAULT_FILE.find(&format!("\n[{table}]"))?;
+        let of_table = &DEFAULT_FILE[begin..];
+        let at = ["", "# "].iter().filter_map(|mark| of_table.find(&format!("\n{mark}{name} = "))).min()?;
+        Some(begin + at)
+    };
     let mut keys = Key::all();
-    keys.sort_by_key(|key| names.iter().position(|name| *name == key.name).unwrap_or(usize::MAX));
+    keys.sort_by_key(|key| place(key).unwrap_or(usize::MAX));
     keys
-}
-
-/// The keys in a text, including those in comments (`# threads = 8`).
-fn names(text: &str) -> Vec<String> {
-    let (mut table, mut names) = (String::new(), Vec::new());
-    for line in text.lines() {
-        let line = line.strip_prefix("# ").unwrap_or(line);
-        if let Some(name) = line.strip_prefix('[').and_then(|rest| rest.split(']').next()) {
-            table = name.to_owned();
-        } else if let Some((name, _)) = line.split_once(" = ")
-            && name.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_')
-        {
-            names.push(format!("{table}.{name}"));
-        }
-    }
-    names
 }

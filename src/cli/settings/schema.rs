@@ -1,14 +1,12 @@
-//! The JSON Schemas of a configuration, from the settings types, and of a profile, from the shipped profiles, each of
-//! which has every key.
+//! The JSON Schemas of a configuration and of a profile, from their types.
 
 use serde_json::{Map, Value, json};
 
 use super::Settings;
 use lanesweep_model::assumptions::Constant;
-use lanesweep_model::driver::Bound;
 use lanesweep_model::profile::Profile;
+use lanesweep_support::Result;
 use lanesweep_support::ranges;
-use lanesweep_support::{Error, Result};
 
 /// JSON Schema (draft 2020-12) of a configuration file.
 pub(crate) fn settings_schema() -> Value {
@@ -59,72 +57,26 @@ fn without_table_defaults(table: &mut Value) {
     inner.for_each(without_table_defaults);
 }
 
-/// JSON Schema (draft 2020-12) of a profile file. The values of options in the shipped profiles are its examples.
+/// JSON Schema (draft 2020-12) of a profile file, with the meaning and the range of every constant.
 ///
 /// # Errors
 /// None for the shipped profiles.
 pub(crate) fn profile_schema() -> Result<Value> {
-    let profiles = Profile::names().map(Profile::load).collect::<Result<Vec<_>>>()?;
-    let bounds: Vec<(String, Bound)> =
-        profiles.iter().flat_map(Profile::bounds).map(|(key, _, bound)| (key, bound)).collect();
-    let unwritten = |e: serde_json::Error| Error::Internal(format!("a profile cannot be written: {e}"));
-    let values =
-        profiles.iter().map(serde_json::to_value).collect::<std::result::Result<Vec<_>, _>>().map_err(unwritten)?;
-    let files = Profile::files().map(toml::from_str::<Value>).collect::<std::result::Result<Vec<_>, _>>();
-    let files = files.map_err(|e| Error::Internal(format!("a profile that ships is no TOML: {e}")))?;
-    let mut schema = profile_part(&values.iter().collect::<Vec<_>>(), &files.iter().collect::<Vec<_>>(), "", &bounds);
-    schema["$schema"] = json!("https://json-schema.org/draft/2020-12/schema");
+    let mut schema = ranges::schema_of::<Profile>();
+    for_toml(&mut schema);
     schema["title"] = json!("lanesweep profile");
+    let place = |key: &str| format!("/properties/{}", key.replace('.', "/properties/"));
     for Constant { key, meaning, .. } in Constant::all() {
-        let path = format!("/properties/{}", key.replace('.', "/properties/"));
-        let Some(property) = schema.pointer_mut(&path) else { continue };
-        let range = property.get("description").and_then(Value::as_str).map(|range| format!("; {range}"));
-        property["description"] = json!(meaning + &range.unwrap_or_default());
+        if let Some(property) = schema.pointer_mut(&place(&key)) {
+            property["description"] = json!(meaning);
+        }
+    }
+    for (key, _, bound) in Profile::load("paper")?.bounds() {
+        let Some(property) = schema.pointer_mut(&place(&key)) else { continue };
+        let meaning = property["description"].as_str().unwrap_or_default();
+        property["description"] = json!(format!("{meaning}; {bound}"));
+        let [min, max] = bound.ends();
+        (property["minimum"], property["maximum"]) = (json!(min), json!(max));
     }
     Ok(schema)
-}
-
-/// `values` are a key's values in the shipped profiles, `files` those that their files contain. A key missing in a file
-/// (of a model with defaults) is not required.
-fn profile_part(values: &[&Value], files: &[&Value], name: &str, bounds: &[(String, Bound)]) -> Value {
-    match values {
-        [Value::Object(first), ..] => {
-            let property = |key: &String| {
-                let inner: Vec<&Value> =
-                    values.iter().filter_map(|value| value.get(key)).filter(|value| !value.is_null()).collect();
-                let name = if name.is_empty() { key.clone() } else { format!("{name}.{key}") };
-                let written: Vec<&Value> = files.iter().filter_map(|file| file.get(key)).collect();
-                (key.clone(), profile_part(&inner, &written, &name, bounds))
-            };
-            let is_written = |key: &&String| !files.is_empty() && files.iter().all(|file| file.get(key).is_some());
-            let properties: Map<String, Value> = first.keys().map(property).collect();
-            let required: Vec<&String> = first.keys().filter(is_written).collect();
-            json!({ "type": "object", "properties": properties, "required": required, "additionalProperties": false })
-        }
-        [Value::Array(_), ..] => json!({ "type": "array", "items": { "type": "string" } }),
-        [first, ..] => {
-            let mut schema = json!({ "type": match first {
-                Value::Bool(_) => "boolean",
-                Value::Number(n) if n.is_f64() => "number",
-                Value::Number(_) => "integer",
-                _ => "string",
-            }});
-            if let Some((_, bound)) = bounds.iter().find(|(key, _)| key == name) {
-                let [min, max] = bound.ends();
-                (schema["minimum"], schema["maximum"]) = (json!(min), json!(max));
-                schema["description"] = json!(bound.to_string());
-            }
-            let mut examples: Vec<&Value> = Vec::new();
-            for value in values {
-                if !examples.contains(value) {
-                    examples.push(value);
-                }
-            }
-            if first.is_string() {
-                schema["examples"] = json!(examples);
-            }
-            schema
-        }
-        [] => json!({}),
-    }
 }

@@ -147,7 +147,7 @@ settings! {
         pub estimator: EstimatorKind = EstimatorKind::Auto,
         /// Number of samples. With a half-width: the maximum. Without it: 100000, or as needed.
         #[serde(skip_serializing_if = "Option::is_none")]
-        #[schemars(range(min = 1))]
+        #[schemars(range(min = 1, max = 281_474_976_710_655_u64))]
         #[schemars(extend("x-flag" = "samples", "x-verbs" = ["sample"], "x-heading" = MODELS))]
         pub samples: Option<u64> = None,
         /// Criterion of importance sampling and of a half-width.

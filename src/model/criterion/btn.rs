@@ -4,12 +4,13 @@
 //! D(a, v) is the distance closed while deceleration a reduces the closing speed v to 0:
 //! `v²/(2a) + v a/(2j) − a³/(24 j²)` for `v ≥ a²/(2j)`, else `(2/3) v sqrt(2v/j)` (the ramp is not finished).
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::scalar::{Flag, Real};
 
 /// Form of the number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum BtnForm {
     /// `v²/(2 (g − v·a_max/(2j)))/a_max`: the ramp counts as a delay of half its duration. Closed form.
@@ -21,7 +22,7 @@ pub enum BtnForm {
 }
 
 /// Whether a contact outside the gate fails the criterion.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum BtnContact {
     /// Every collision, side contacts included, fails BTN.

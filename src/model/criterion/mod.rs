@@ -69,7 +69,7 @@ impl Criterion {
 }
 
 /// Which vehicles TTC and BTN evaluate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum LateralGate {
     /// `|y_o − y_e| ≤ W_ego` (the paper).
@@ -79,7 +79,7 @@ pub enum LateralGate {
 }
 
 /// Constants of the criteria as a profile gives them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CriteriaProfile {
     /// TTC below this fails, s (1).

@@ -2,6 +2,7 @@
 //! and perception rules of UN R157. It is computed once per case, so a lane holds one step index per model instead of
 //! perception state. Twin: `shaders/shared/attention.wgsl`.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::category::Category;
@@ -34,7 +35,7 @@ const ROUNDING: f64 = 1e-9;
 
 /// What the driver does while the lead has lost speed without decelerating more than the trigger. The text of Annex 3
 /// does not say; its charts contain such leads.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum BelowTrigger {
     /// It does not react (the text alone).

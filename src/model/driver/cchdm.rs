@@ -1,6 +1,7 @@
 //! CCHDM: the careful and competent human driver of UN R157, Annex 3. It perceives a cut-in, coasts during the delay,
 //! then ramps up to 0.774 g.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -11,7 +12,7 @@ use crate::category::Category;
 use crate::scalar::{Flag, Real};
 
 /// Constants of the model as a profile gives them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CchdmProfile {
     /// The check is active below this lateral gap, m; 0 means that the vehicles overlap laterally.
@@ -53,7 +54,7 @@ pub struct CchdmProfile {
 }
 
 /// When braking for a vehicle that cuts in ends. The tables of Annex 3 do not specify it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum CutInBraking {
     /// At each step at which the TTC exceeds `ttc_s` (the JRC's simulator). Braking can then restart and end

@@ -1,6 +1,7 @@
 //! FSM: the Fuzzy Safety Model (Mattas et al. 2020; UN R157, Annex 3). Two fuzzy surrogates, proactive (PFS) and
 //! critical (CFS), determine how hard the driver brakes.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -10,7 +11,7 @@ use crate::category::Category;
 use crate::scalar::{Flag, Real};
 
 /// Which acceleration the CFS step divides by if the ego would be slower than the other vehicle after τ.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum CfsStep {
     /// The ego's present acceleration (the JRC's simulator).
@@ -20,7 +21,7 @@ pub enum CfsStep {
 }
 
 /// Constants of the model as a profile gives them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FsmProfile {
     /// τ: reaction time, s (0.75).

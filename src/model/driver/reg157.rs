@@ -1,6 +1,7 @@
 //! Reg157: the performance model of UN R157, 5.2.5.2 (cut-in): brake at 6 m/s² once the time to collision
 //! at lane intrusion falls below what 6 m/s² and 0.35 s need.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::profile::rounded_down_s;
@@ -12,7 +13,7 @@ use crate::category::Category;
 use crate::scalar::{Flag, Real};
 
 /// Constants of the model as a profile gives them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Reg157Profile {
     /// The clause that defines these numbers, as sheets name it.

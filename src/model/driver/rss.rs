@@ -1,6 +1,7 @@
 //! RSS: Responsibility-Sensitive Safety. Unsafe when both the longitudinal and the lateral distance are
 //! below their safe values.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -10,7 +11,7 @@ use crate::category::Category;
 use crate::scalar::{Flag, Real};
 
 /// Constants of the model as a profile gives them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RssProfile {
     /// ρ: response time, s (0.75).

@@ -25,7 +25,7 @@ impl FinerStep {
         budget: &StepBudget,
     ) -> Result<FinerStep> {
         budget.check()?;
-        let profile = Perturbation::FinerStep.profile(profile)?;
+        let profile = Perturbation::FINER_STEP.profile(profile)?;
         let lane = subject.lane(&profile, subject.point())?;
         let outcomes: Vec<_> =
             models.iter().map(|model| lane.run(&profile, subject.category(), *model).outcome).collect();
@@ -37,6 +37,6 @@ impl FinerStep {
 impl Judgement {
     /// Whether a tenth of the time step changes the answer.
     pub fn turns_with_a_finer_step(&self) -> bool {
-        self.flips.contains(&Perturbation::FinerStep.label())
+        self.flips.contains(&Perturbation::FINER_STEP.label())
     }
 }

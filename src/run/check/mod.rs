@@ -265,16 +265,14 @@ impl Check {
     }
 
     fn under(&self, profile: &Profile, with_boundaries: bool) -> Result<Judgement> {
-        let lane = self.subject.lane(profile, self.subject.point())?;
+        let (lane, category) = (self.subject.lane(profile, self.subject.point())?, self.subject.category());
         profile.check_time_step(&self.models)?;
         check_time_step(&lane.case, &lane.tables, profile.frame.dt_s, || Place::item("the case"))?;
-        let trace = |model| lane.trace(profile, self.subject.category(), model);
+        let trace = |model| lane.trace(profile, category, model);
         let budget = StepBudget { profile, left: Cell::new(MAX_STEPS) };
-        let run = |model: &ModelId| lane.run(profile, self.subject.category(), *model).outcome;
-        let unreacting = lane.run(&without_reaction(profile), self.subject.category(), ModelId::Reg157).outcome;
-        let traced = self.models.iter().map(run).chain([unreacting]).map(|outcome| u64::from(outcome.end_step) + 1);
-        let traced: u64 = traced.sum();
-        if traced > MAX_TRACED_STEPS {
+        let steps = |profile: &Profile, model| u64::from(lane.run(profile, category, model).outcome.end_step) + 1;
+        let traced: u64 = self.models.iter().map(|model| steps(profile, *model)).sum();
+        if traced + steps(&without_reaction(profile), ModelId::Reg157) > MAX_TRACED_STEPS {
             return Err(too_many_steps(profile));
         }
         let changed = self.perturbed(profile, false, &budget)?;
@@ -287,13 +285,19 @@ impl Check {
             flips: driver(model),
             touches: touching.contains(&model),
         });
-        let unreacting = lane.unreacting(profile, self.subject.category());
-        let attends_at_once = annex::attends_at_once(profile, self.subject.category(), &lane);
+        let unreacting = lane.unreacting(profile, category);
+        let attends_at_once = annex::attends_at_once(profile, category, &lane);
         let (mut silent, turned) = self.silent(profile, &changed[0], &budget)?;
         silent.extend(attends_at_once.map(str::to_owned));
         let is = &changed[0].verdicts;
         let turns =
             |model: &&ModelId| turned.iter().any(|other| other.verdicts.collides(**model) != is.collides(**model));
+        let (mut boundaries, mut finer, mut by_rule) = Default::default();
+        if with_boundaries {
+            boundaries = boundary::boundaries(&self.subject, profile, &budget)?;
+            finer = Some(FinerStep::run(&self.subject, profile, &self.models, &budget)?);
+            by_rule = self.by_rule(profile, (&changed, &touching), &budget)?;
+        }
         Ok(Judgement {
             profile: profile.name.clone(),
             models: models.collect(),
@@ -303,31 +307,17 @@ impl Check {
             driver_flips: ModelId::ALL.map(driver).to_vec(),
             demand_flips: flips(&changed, |changed| changed.demand),
             clause: profile.reg157.clause.clone(),
-            danger: annex::danger(profile, self.subject.category()),
-            outside_annex: annex::outside(profile, self.subject.category(), self.subject.point()),
+            danger: annex::danger(profile, category),
+            outside_annex: annex::outside(profile, category, self.subject.point()),
             annex_flips: flips(&changed, |changed| changed.verdicts.is_outside_annex),
             silent,
             reading_turns_answer: turned.iter().any(|other| other.verdicts.answer() != is.answer()),
             reading_turns_demand: turned.iter().any(|other| other.demand != changed[0].demand),
             reading_turns: is.reference_drivers.iter().filter(turns).copied().collect(),
-            readings: clauses::readings(
-                profile,
-                self.subject.category(),
-                &unreacting,
-                &trace,
-                attends_at_once.is_some(),
-            ),
-            boundaries: match with_boundaries {
-                true => boundary::boundaries(&self.subject, profile, &budget)?,
-                false => Vec::new(),
-            },
-            finer: with_boundaries
-                .then(|| FinerStep::run(&self.subject, profile, &self.models, &budget))
-                .transpose()?,
-            by_rule: match with_boundaries {
-                true => self.by_rule(profile, (&changed, &touching), &budget)?,
-                false => Vec::new(),
-            },
+            readings: clauses::readings(profile, category, &unreacting, &trace, attends_at_once.is_some()),
+            boundaries,
+            finer,
+            by_rule,
             touching,
             time_cap_s: profile.frame.time_cap_s,
             drives_through_s: self.subject.drives_through_s(profile)?,
@@ -336,7 +326,7 @@ impl Check {
 
     /// Drivers whose smallest gap is not distinguishable from a contact.
     fn touching(&self, changed: &[Changed], profile: &Profile) -> Result<Vec<ModelId>> {
-        let finer = Perturbation::FinerStep;
+        let finer = Perturbation::FINER_STEP;
         let Some(found) = changed.iter().find(|changed| changed.by == finer.label()) else { return Ok(Vec::new()) };
         let finer_dt_s = finer.profile(profile)?.frame.dt_s;
         let touches = |model: &ModelId| {

@@ -41,32 +41,24 @@ pub struct LaneRun {
 impl Subject {
     /// From plain numbers.
     pub fn plain(case: &PlainCase, headway: Headway) -> Subject {
-        let start = start(headway, case.ego_speed_mps);
-        let mut point = Point::default()
-            .with(CaseQuantity::EgoSpeed, case.ego_speed_mps)
-            .with(CaseQuantity::OtherSpeed, case.speed_mps)
-            .with(start.0, start.1)
-            .with(CaseQuantity::Length, case.length_m)
-            .with(CaseQuantity::Width, case.width_m)
-            .with(CaseQuantity::EgoLength, case.ego_length_m)
-            .with(CaseQuantity::EgoWidth, case.ego_width_m);
-        if case.acceleration_mps2 != 0.0 {
-            point = point.with(CaseQuantity::Deceleration, -case.acceleration_mps2);
-        }
-        if let Some(end_mps) = case.end_speed_mps {
-            point = point.with(CaseQuantity::EndSpeed, end_mps);
-        }
-        if case.category != Category::Lvd {
-            point = point
-                .with(CaseQuantity::LateralSpeed, case.lateral_speed_mps)
-                .with(CaseQuantity::LateralDistance, case.lateral_distance_m)
-                .with(CaseQuantity::LaneWidth, case.lane_width_m);
-        }
-        if case.category == Category::CutOut {
-            point = point
-                .with(CaseQuantity::AheadSpeed, case.ahead_speed_mps)
-                .with(CaseQuantity::AheadGap, case.ahead_gap_m);
-        }
+        let (is_lateral, is_pair) = (case.category != Category::Lvd, case.category == Category::CutOut);
+        let (start, start_si) = start(headway, case.ego_speed_mps);
+        let point = Point::of([
+            (CaseQuantity::EgoSpeed, Some(case.ego_speed_mps)),
+            (CaseQuantity::OtherSpeed, Some(case.speed_mps)),
+            (start, Some(start_si)),
+            (CaseQuantity::Length, Some(case.length_m)),
+            (CaseQuantity::Width, Some(case.width_m)),
+            (CaseQuantity::EgoLength, Some(case.ego_length_m)),
+            (CaseQuantity::EgoWidth, Some(case.ego_width_m)),
+            (CaseQuantity::Deceleration, Some(-case.acceleration_mps2).filter(|a| *a != 0.0)),
+            (CaseQuantity::EndSpeed, case.end_speed_mps),
+            (CaseQuantity::LateralSpeed, Some(case.lateral_speed_mps).filter(|_| is_lateral)),
+            (CaseQuantity::LateralDistance, Some(case.lateral_distance_m).filter(|_| is_lateral)),
+            (CaseQuantity::LaneWidth, Some(case.lane_width_m).filter(|_| is_lateral)),
+            (CaseQuantity::AheadSpeed, Some(case.ahead_speed_mps).filter(|_| is_pair)),
+            (CaseQuantity::AheadGap, Some(case.ahead_gap_m).filter(|_| is_pair)),
+        ]);
         Subject::Plain(*case, point)
     }
 
@@ -85,22 +77,22 @@ impl Subject {
         };
         let other_mps = scenario.target.v.first().copied().unwrap_or(0.0).max(0.0);
         let ego_mps = if scenario.category == Category::Lvd { other_mps } else { scenario.ego.v0 };
-        let start = match headway {
+        let (start, start_si) = match headway {
             Some(headway) => start(headway, ego_mps),
             None => (CaseQuantity::Gap, scenario.gap0.filter(|gap| gap.is_finite()).ok_or_else(missing)?),
         };
-        let mut point = Point::default()
-            .with(CaseQuantity::EgoSpeed, ego_mps)
-            .with(CaseQuantity::OtherSpeed, other_mps)
-            .with(start.0, start.1)
-            .with(CaseQuantity::Length, scenario.target.length)
-            .with(CaseQuantity::Width, scenario.target.width)
-            .with(CaseQuantity::EgoLength, scenario.ego.length)
-            .with(CaseQuantity::EgoWidth, scenario.ego.width);
-        if let Some(y_m) = scenario.target.y.first().filter(|_| scenario.category != Category::Lvd) {
-            point =
-                point.with(CaseQuantity::LateralDistance, y_m.abs()).with(CaseQuantity::LaneWidth, scenario.lane_width);
-        }
+        let y_m = scenario.target.y.first().filter(|_| scenario.category != Category::Lvd);
+        let point = Point::of([
+            (CaseQuantity::EgoSpeed, Some(ego_mps)),
+            (CaseQuantity::OtherSpeed, Some(other_mps)),
+            (start, Some(start_si)),
+            (CaseQuantity::Length, Some(scenario.target.length)),
+            (CaseQuantity::Width, Some(scenario.target.width)),
+            (CaseQuantity::EgoLength, Some(scenario.ego.length)),
+            (CaseQuantity::EgoWidth, Some(scenario.ego.width)),
+            (CaseQuantity::LateralDistance, y_m.map(|y_m| y_m.abs())),
+            (CaseQuantity::LaneWidth, y_m.map(|_| scenario.lane_width)),
+        ]);
         Ok(Subject::Recorded(Box::new(scenario), point))
     }
 

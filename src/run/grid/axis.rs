@@ -48,15 +48,6 @@ impl GridAxis {
         Ok(GridAxis { parameter, values })
     }
 
-    /// For presets, whose parameter and range are valid.
-    ///
-    /// # Errors
-    /// As [`GridAxis::parse`].
-    pub fn range(category: Category, key: &str, ends: (f64, f64), step: f64) -> Result<GridAxis> {
-        let parameter = MapParameter::find(category, key, "preset")?;
-        Ok(GridAxis { parameter, values: range(ends, step, key, "preset")? })
-    }
-
     /// Number of values.
     pub fn len(&self) -> usize {
         self.values.len()

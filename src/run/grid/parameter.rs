@@ -147,6 +147,13 @@ pub struct Point {
 }
 
 impl Point {
+    /// Values in SI units.
+    pub(crate) fn of(given: impl IntoIterator<Item = (CaseQuantity, Option<f64>)>) -> Point {
+        let mut point = Point::default();
+        given.into_iter().for_each(|(quantity, si)| point.values[quantity as usize] = si);
+        point
+    }
+
     /// Sets the quantity of a parameter from a value in the parameter's unit.
     pub(crate) fn set(&mut self, parameter: &MapParameter, value: f64) {
         let set =

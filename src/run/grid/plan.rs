@@ -128,9 +128,7 @@ impl GridPart {
             source.blocks[0].cases.push(case);
             let varies = |parameter: &MapParameter| layout == Layout::Cells || !is_distance(parameter);
             let values = grid.values(cell).into_iter().filter(|(parameter, _)| varies(parameter));
-            names.push(
-                values.map(|(parameter, value)| format!("{}={value}", parameter.key)).collect::<Vec<_>>().join(","),
-            );
+            names.push(written(values));
         }
         let block = Block::new(grid.category, names.into_iter().collect(), vec![VARIANT.to_owned()]);
         let source = Arc::new(source);
@@ -161,9 +159,13 @@ impl Layout {
 /// Adds the cell to an error about a case.
 fn of_cell(grid: &Grid, cell: usize, error: Error) -> Error {
     let Error::Usage { place, problem, help } = error else { return error };
-    let values = grid.values(cell).into_iter().map(|(parameter, value)| format!("{}={value}", parameter.key));
-    let cell = values.collect::<Vec<_>>().join(",");
-    Error::usage(Place::item(format!("cell {cell}, {place}")), problem, help)
+    Error::usage(Place::item(format!("cell {}, {place}", written(grid.values(cell)))), problem, help)
+}
+
+/// `gap_m=20,lateral_speed_mps=1`.
+fn written(values: impl IntoIterator<Item = (&'static MapParameter, f64)>) -> String {
+    let values = values.into_iter().map(|(parameter, value)| format!("{}={value}", parameter.key));
+    values.collect::<Vec<_>>().join(",")
 }
 
 fn is_distance(parameter: &MapParameter) -> bool {

@@ -3,7 +3,7 @@
 
 use super::parameter::Point;
 use lanesweep_model::profile::{MAX_STEPS, Profile};
-use lanesweep_model::scenario::{CaseQuantity, Category, MeasurementError, NUMBERS};
+use lanesweep_model::scenario::{CaseNumber, CaseQuantity, Category, MeasurementError, NUMBERS};
 use lanesweep_support::Result;
 
 /// The changes in words; a case has those of its inputs.
@@ -12,58 +12,45 @@ pub const VARIED: &str = "a tenth of the time step; 0.1 km/h of a speed along th
 
 /// A small change of a case or of how it is computed. The changes of inputs have the size of a usual measurement error.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Perturbation {
-    /// A tenth of the time step, in binary64: shows the effect of steps and rounding. Half a step would keep half of
-    /// the step error, and round a delay as the whole step does.
-    FinerStep,
-    /// More of an input.
-    More(CaseQuantity, &'static MeasurementError),
-    /// Less of it.
-    Less(CaseQuantity, &'static MeasurementError),
+pub struct Perturbation {
+    label: &'static str,
+    /// The quantity that changes, and by how much in SI units; `None` for the time step.
+    change: Option<(CaseQuantity, f64)>,
 }
 
 impl Perturbation {
+    /// A tenth of the time step, in binary64: shows the effect of steps and rounding. Half a step would keep half of
+    /// the step error, and round a delay as the whole step does.
+    pub const FINER_STEP: Perturbation = Perturbation { label: "a tenth of the time step", change: None };
+
     /// All that a category has, in the order of messages.
     pub(crate) fn all(category: Category) -> Vec<Perturbation> {
         // The gap first: it decides most often.
         let ordered = [CaseQuantity::Gap.number()].into_iter();
         let ordered = ordered.chain(NUMBERS.iter().filter(|number| number.quantity != CaseQuantity::Gap));
         let varied = ordered.filter(|number| number.categories.contains(&category));
-        let both = varied.filter_map(|number| {
-            let error = number.error?;
-            Some([Perturbation::More(number.quantity, error), Perturbation::Less(number.quantity, error)])
+        let both = varied.filter_map(|&CaseNumber { quantity, error, .. }| {
+            let &MeasurementError { si, more, less } = error?;
+            Some([(more, si), (less, -si)].map(|(label, by)| Perturbation { label, change: Some((quantity, by)) }))
         });
-        std::iter::once(Perturbation::FinerStep).chain(both.flatten()).collect()
+        std::iter::once(Perturbation::FINER_STEP).chain(both.flatten()).collect()
     }
 
     /// Description.
     pub fn label(self) -> &'static str {
-        match self {
-            Perturbation::FinerStep => "a tenth of the time step",
-            Perturbation::More(_, error) => error.more,
-            Perturbation::Less(_, error) => error.less,
-        }
-    }
-
-    /// The quantity that changes, and by how much in SI units; `None` for the time step.
-    fn change(self) -> Option<(CaseQuantity, f64)> {
-        match self {
-            Perturbation::FinerStep => None,
-            Perturbation::More(quantity, error) => Some((quantity, error.si)),
-            Perturbation::Less(quantity, error) => Some((quantity, -error.si)),
-        }
+        self.label
     }
 
     /// Whether it changes a size or a place across the road, which the JRC's cases fix.
     pub(super) fn is_of_geometry(self) -> bool {
         use CaseQuantity::{EgoLength, EgoWidth, LaneWidth, LateralDistance, Length, Width};
         let fixed = [LateralDistance, Length, Width, EgoLength, EgoWidth, LaneWidth];
-        self.change().is_some_and(|(quantity, _)| fixed.contains(&quantity))
+        self.change.is_some_and(|(quantity, _)| fixed.contains(&quantity))
     }
 
     /// Change of the initial gap, m.
     pub(crate) fn gap_m(self) -> f64 {
-        self.change().filter(|(quantity, _)| *quantity == CaseQuantity::Gap).map_or(0.0, |(_, by_m)| by_m)
+        self.change.filter(|(quantity, _)| *quantity == CaseQuantity::Gap).map_or(0.0, |(_, by_m)| by_m)
     }
 
     /// The profile for the perturbed case.
@@ -71,24 +58,22 @@ impl Perturbation {
     /// # Errors
     /// [`lanesweep_support::Error::Usage`] for a time step that is too short.
     pub(crate) fn profile(self, profile: &Profile) -> Result<Profile> {
-        match self {
-            Perturbation::FinerStep => {
-                let frame = &profile.frame;
-                profile.clone().with_dt((frame.dt_s / 10.0).max(frame.time_cap_s / MAX_STEPS).min(frame.dt_s))
-            }
-            _ => Ok(profile.clone()),
+        if self.change.is_some() {
+            return Ok(profile.clone());
         }
+        let frame = &profile.frame;
+        profile.clone().with_dt((frame.dt_s / 10.0).max(frame.time_cap_s / MAX_STEPS).min(frame.dt_s))
     }
 
     /// Whether the perturbed case is computed in binary64, independent of the sweep's arithmetic.
     pub(super) fn is_binary64(self) -> bool {
-        self == Perturbation::FinerStep
+        self.change.is_none()
     }
 
     /// The same point with another value of an input, except the gap. An input that the point does not have, and a
     /// value that would make the case contradictory, stay as they are.
     pub(super) fn of_inputs(self, mut point: Point) -> Point {
-        let Some((quantity, by)) = self.change().filter(|(quantity, _)| *quantity != CaseQuantity::Gap) else {
+        let Some((quantity, by)) = self.change.filter(|(quantity, _)| *quantity != CaseQuantity::Gap) else {
             return point;
         };
         if let Some(other_mps) = point.value(CaseQuantity::OtherSpeed) {

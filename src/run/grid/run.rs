@@ -92,27 +92,6 @@ pub struct MapResult {
     pub summary: SweepSummary,
 }
 
-impl MapOptions {
-    /// The grids under a profile, with their models.
-    fn presets(&self, profile: &Profile) -> Result<Vec<Preset>> {
-        let mut presets = match &self.grids {
-            MapGrids::Preset(presets, category) => presets.of(*category, profile)?,
-            MapGrids::Own(grid) => vec![Preset {
-                grid: Grid::clone(grid),
-                models: ModelId::ALL.to_vec(),
-                known_percent: Vec::new(),
-                is_chosen_to_match: false,
-            }],
-        };
-        for preset in &mut presets {
-            if let Some(models) = &self.models {
-                preset.models.clone_from(models);
-            }
-        }
-        Ok(presets)
-    }
-}
-
 impl Map {
     /// Plans every cell of every grid with every model.
     ///
@@ -122,16 +101,24 @@ impl Map {
         let is_published = matches!(options.grids, MapGrids::Preset(Presets::Jrc, _))
             && options.criterion == Criterion::Collision
             && *profile == Profile::load(presets::JRC_PROFILE)?;
+        let presets = match options.grids {
+            MapGrids::Preset(presets, category) => presets.of(category, profile)?,
+            MapGrids::Own(grid) => {
+                let (models, known_percent) = (ModelId::ALL.to_vec(), Vec::new());
+                vec![Preset { grid: *grid, models, known_percent, is_chosen_to_match: false }]
+            }
+        };
         let mut grids = Vec::new();
-        for preset in options.presets(profile)? {
-            let plan = GridPlan::new(preset.grid.clone(), profile, &preset.models)?;
+        for preset in presets {
+            let models = options.models.as_ref().unwrap_or(&preset.models);
+            let plan = GridPlan::new(preset.grid.clone(), profile, models)?;
             let all = plan.grid.perturbations().into_iter().filter(|_| options.robust);
             let perturbed = all.map(|by| Ok((by, plan.perturbed(profile, by)?))).collect::<Result<_>>()?;
             let known = |model: &ModelId| if is_published { preset.known(*model) } else { None };
             grids.push(PlannedGrid {
                 plan,
                 perturbed,
-                known_percent: preset.models.iter().map(known).collect(),
+                known_percent: models.iter().map(known).collect(),
                 is_chosen_to_match: preset.is_chosen_to_match && is_published,
             });
         }

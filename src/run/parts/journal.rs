@@ -1,22 +1,19 @@
-//! The journal of an unfinished part: one record per line, each with its checksum. The first line identifies the run
-//! and the interval. Reading stops at the first torn or damaged record; everything after it is recomputed.
+//! The journal of an unfinished part: one sealed record per line. The first line identifies the run and the interval.
+//! Reading stops at the first torn or damaged record; everything after it is recomputed.
 
 use std::fs::{File, OpenOptions};
-use std::io::{BufRead, BufReader, Read, Seek, SeekFrom, Write};
+use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 use std::marker::PhantomData;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use serde::Serialize;
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
-use super::sealed::json_line;
-use lanesweep_engine::ENGINE_VERSION;
+use super::sealed::{check_begin, json_line, seal, unseal};
 use lanesweep_support::atomic_file::{is_named, refuse_link};
 use lanesweep_support::files::remove_file;
-use lanesweep_support::plain_text::hex;
 use lanesweep_support::{Error, Place, Result};
 
 /// Minimum time between two records.
@@ -24,28 +21,16 @@ const MIN_WAIT: Duration = Duration::from_millis(250);
 /// The wait between records is at least this multiple of the time that the last write took, so that journals cost at
 /// most 1 %.
 const PATIENCE: u32 = 100;
-/// Maximum length of the first line, bytes.
-const MAX_HEAD_BYTES: u64 = 4096;
-/// A larger file without a complete first line is not a journal torn at its start, bytes.
-const MAX_FIRST_BYTES: u64 = 16 << 20;
 /// Maximum size of a journal that is read, bytes.
 const MAX_BYTES: u64 = 4 << 30;
-/// Hexadecimal characters of a checksum.
-const CHECKSUM: usize = 64;
-
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Head {
-    lanesweep_journal: u64,
-    engine: u64,
-    run_sha256: String,
-    units: Range<u64>,
-}
+/// Kinds of the sealed lines: the first one, and all others.
+const KINDS: [&str; 2] = ["journal", "record"];
 
 /// An open journal. The file is created with the first record: a run that ends earlier leaves none.
 pub struct Journal<T> {
     path: PathBuf,
-    head: Head,
+    /// The first line.
+    head: Vec<u8>,
     file: Option<File>,
     due: Instant,
     spent: Duration,
@@ -66,17 +51,15 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
     /// # Errors
     /// [`Error::Io`]; [`Error::Input`] if the file is the journal of another run or interval.
     pub fn open(path: &Path, run_sha256: &str, units: Range<u64>) -> Result<(Journal<T>, Records<T>)> {
-        let engine = ENGINE_VERSION;
-        let head = Head { lanesweep_journal: 4, engine, run_sha256: run_sha256.to_owned(), units };
+        let head = seal(KINDS[0], &(run_sha256, units))?.0;
         let due = Instant::now() + MIN_WAIT;
         let mut journal =
             Journal { path: path.to_path_buf(), head, file: None, due, spent: Duration::ZERO, kind: PhantomData };
+        let mut found = Records { records: Vec::new(), torn: false };
         refuse_link(path)?;
         let mut file = match OpenOptions::new().read(true).write(true).open(path) {
             Ok(file) => file,
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
-                return Ok((journal, Records { records: Vec::new(), torn: false }));
-            }
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok((journal, found)),
             Err(e) => return Err(Error::io(path, "read", e)),
         };
         let io = |e| Error::io(path, "read", e);
@@ -85,55 +68,32 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
             let help = "move it away; what it holds is then computed again";
             return Err(Error::input(Place::file(path), "this is no journal of lanesweep", help));
         }
-        let (records, whole) = journal.parse(&mut BufReader::with_capacity(1 << 16, &file))?;
-        if whole == 0 && (about.len() > MAX_FIRST_BYTES || !begins_as_journal(&file).map_err(io)?) {
-            let help = "move it away: it holds nothing that a run could continue from";
-            return Err(Error::input(Place::file(path), "this is no journal of lanesweep", help));
+        let (mut lines, mut begin) = (BufReader::with_capacity(1 << 16, &file), Vec::new());
+        lines.by_ref().take(journal.head.len() as u64).read_to_end(&mut begin).map_err(io)?;
+        if begin != journal.head {
+            if journal.head.starts_with(&begin) {
+                // Even the first line is incomplete, so the journal is recreated.
+                remove_file(path)?;
+                return Ok((journal, Records { torn: true, ..found }));
+            }
+            let other = || "this journal belongs to another run or another interval of it, or is damaged".to_owned();
+            let help = "move it away, or finish that run first: give the command that it was begun with";
+            let problem = check_begin(KINDS[0], &begin).err().unwrap_or_else(other);
+            return Err(Error::input(Place::file(path), problem, help));
         }
-        let torn = whole < about.len();
+        let mut whole = begin.len() as u64;
+        // Only one line at a time is in memory.
+        while let Some(line) = json_line(&mut lines, MAX_BYTES).map_err(io)? {
+            let Ok((record, _)) = unseal(KINDS[1], &line, &Place::default(), "") else { break };
+            found.records.push(record);
+            whole += line.len() as u64;
+        }
+        found.torn = whole < about.len();
         let io = |e| Error::io(path, "write", e);
         file.set_len(whole).map_err(io)?;
         file.seek(SeekFrom::End(0)).map_err(io)?;
-        if whole > 0 {
-            journal.file = Some(file);
-        } else {
-            // Even the first line is incomplete, so the journal is recreated.
-            std::fs::remove_file(path).map_err(io)?;
-        }
-        Ok((journal, Records { records, torn }))
-    }
-
-    /// The complete records and their end in the file; only one line at a time is in memory.
-    fn parse(&self, file: &mut impl BufRead) -> Result<(Vec<T>, u64)> {
-        let (mut records, mut whole) = (Vec::new(), 0);
-        let longest = |whole: u64| if whole == 0 { MAX_HEAD_BYTES } else { MAX_BYTES };
-        while let Some(line) = json_line(file, longest(whole)).map_err(|e| Error::io(&self.path, "read", e))? {
-            let Some(body) = checked(&line) else { break };
-            if whole == 0 {
-                let help = "move it away, or finish that run first: give the command that it was begun with";
-                let Ok(head) = serde_json::from_slice::<Head>(body) else {
-                    let problem = "this journal is of another version of lanesweep";
-                    return Err(Error::input(Place::file(&self.path), problem, help));
-                };
-                if head.engine != self.head.engine {
-                    let problem = format!(
-                        "this journal is of engine {}, this program has engine {ENGINE_VERSION}: their lanes differ, \
-                         and are never mixed",
-                        head.engine
-                    );
-                    return Err(Error::input(Place::file(&self.path), problem, help));
-                }
-                if head != self.head {
-                    let problem = "this journal belongs to another run or another interval of it";
-                    return Err(Error::input(Place::file(&self.path), problem, help));
-                }
-            } else {
-                let Ok(record) = serde_json::from_slice(body) else { break };
-                records.push(record);
-            }
-            whole += line.len() as u64;
-        }
-        Ok((records, whole))
+        journal.file = Some(file);
+        Ok((journal, found))
     }
 
     /// Whether the next record is due.
@@ -149,10 +109,10 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
         let started = Instant::now();
         let mut text = Vec::new();
         if self.file.is_none() {
-            text = line_of(&self.head)?;
+            text.clone_from(&self.head);
         }
         for record in records {
-            text.extend(line_of(record)?);
+            text.extend(seal(KINDS[1], record)?.0);
         }
         match &self.file {
             // Otherwise the system would continue to write to a deleted file.
@@ -211,31 +171,4 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }
-}
-
-/// Formats a record as `checksum content` and a line end.
-fn line_of<R: Serialize>(record: &R) -> Result<Vec<u8>> {
-    let body =
-        serde_json::to_vec(record).map_err(|e| Error::Internal(format!("a journal record cannot be written: {e}")))?;
-    let mut line = hex(&Sha256::digest(&body)).into_bytes();
-    line.push(b' ');
-    line.extend(body);
-    line.push(b'\n');
-    Ok(line)
-}
-
-/// Whether a file may be a journal that was torn at its start: its available bytes begin with a checksum.
-fn begins_as_journal(mut file: &File) -> std::io::Result<bool> {
-    let mut begin = Vec::new();
-    file.rewind()?;
-    file.take(CHECKSUM as u64).read_to_end(&mut begin)?;
-    Ok(begin.iter().all(|byte| byte.is_ascii_hexdigit()))
-}
-
-/// The content of a complete line.
-fn checked(line: &[u8]) -> Option<&[u8]> {
-    let line = line.strip_suffix(b"\n")?;
-    let (checksum, body) = line.split_at_checked(CHECKSUM)?;
-    let body = body.strip_prefix(b" ")?;
-    (hex(&Sha256::digest(body)).as_bytes() == checksum).then_some(body)
 }

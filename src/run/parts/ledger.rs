@@ -6,7 +6,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::journal::{Journal, Records};
-use lanesweep_engine::{Partial, SampleTally};
+use lanesweep_engine::Partial;
 use lanesweep_support::{Error, Result};
 
 /// Counts over a set of units of one plan that can be merged in any order.
@@ -79,22 +79,11 @@ impl<T: MergeableCounts> Ledger<T> {
         self.ends.partition_point(|end| *end <= unit)
     }
 
-    /// The segment that contains all of these intervals.
-    fn segment_holding(&self, covered: &[Range<u64>]) -> Option<usize> {
-        let (first, last) = (covered.first()?, covered.last()?);
-        let segment = self.segment_of(first.start);
-        (first.start >= self.units.start && last.end <= *self.ends.get(segment)?).then_some(segment)
-    }
-
     fn place(&mut self, Counted { counts, redone_and_rechecked }: Counted<T>) -> Result<()> {
-        let covered = counts.covered();
-        if covered.is_empty() {
-            return Ok(());
-        }
-        let Some(segment) = self.segment_holding(&covered) else {
-            return Err(Error::Internal(format!("units {covered:?} do not fit a segment of {:?}", self.units)));
-        };
-        let slot = &mut self.segments[segment];
+        let Some(first) = counts.covered().first().map(|covered| covered.start) else { return Ok(()) };
+        let segment = self.segment_of(first);
+        let outside = || Error::Internal(format!("unit {first} is not one of {:?}", self.units));
+        let slot = self.segments.get_mut(segment).ok_or_else(outside)?;
         *slot = Some(match slot.take() {
             Some(before) => before.join(counts)?,
             None => counts,
@@ -263,16 +252,6 @@ impl MergeableCounts for Partial {
             }
         }
         intervals
-    }
-
-    fn join(self, other: Self) -> Result<Self> {
-        self.merge(other)
-    }
-}
-
-impl MergeableCounts for SampleTally {
-    fn covered(&self) -> Vec<Range<u64>> {
-        SampleTally::covered(self).to_vec()
     }
 
     fn join(self, other: Self) -> Result<Self> {

@@ -16,7 +16,7 @@ pub(crate) use job::units_of;
 pub use job::{Computed, EachChunk, Job, JobRun};
 pub use journal::{Journal, Records};
 pub use ledger::{Counted, Ledger, MergeableCounts};
-pub(crate) use sealed::{kind_of, read_sealed};
+pub(crate) use sealed::{check_engine, kind_of, read_sealed};
 pub use sealed::{read_sealed_line, seal, unseal};
 pub(crate) use shared_plan::leave_plan;
 pub use shared_plan::{PLAN_FILE, RUN_PLAN_FILE};

@@ -10,7 +10,7 @@ use serde_json::value::RawValue;
 use sha2::{Digest, Sha256};
 
 use lanesweep_engine::ENGINE_VERSION;
-use lanesweep_support::input_file::{ends, open, read};
+use lanesweep_support::input_file::open;
 use lanesweep_support::plain_text::hex;
 use lanesweep_support::{Error, Place, Result};
 
@@ -41,7 +41,7 @@ fn checksum(kind: &str, content: &RawValue) -> String {
 /// # Errors
 /// None for types of this program.
 pub fn seal<T: Serialize>(kind: &str, content: &T) -> Result<(Vec<u8>, String)> {
-    let unwritable = |e: serde_json::Error| unwritable(kind, &e);
+    let unwritable = |e: serde_json::Error| Error::Internal(format!("a {kind} cannot be written: {e}"));
     let content = serde_json::value::to_raw_value(content).map_err(unwritable)?;
     let sha256 = checksum(kind, &content);
     let (lanesweep, engine) = (kind.to_owned(), ENGINE_VERSION);
@@ -49,10 +49,6 @@ pub fn seal<T: Serialize>(kind: &str, content: &T) -> Result<(Vec<u8>, String)> 
     let mut text = serde_json::to_vec(&sealed).map_err(unwritable)?;
     text.push(b'\n');
     Ok((text, sealed.sha256))
-}
-
-fn unwritable(kind: &str, e: &serde_json::Error) -> Error {
-    Error::Internal(format!("a {kind} cannot be written: {e}"))
 }
 
 /// Returns the content of a sealed text and its checksum. `again` says how to remake such a file.
@@ -71,8 +67,7 @@ pub fn unseal<T: DeserializeOwned>(kind: &str, text: &[u8], place: &Place, again
     Ok((content, sealed.sha256))
 }
 
-/// Reads a sealed file of at most `max_bytes` bytes. Its first and last bytes are checked before all is read, to detect
-/// other and truncated files.
+/// Reads a sealed file of at most `max_bytes` bytes. Other, truncated and longer files are not read as a whole.
 ///
 /// # Errors
 /// [`Error::Io`]; as [`unseal`].
@@ -82,61 +77,51 @@ pub(crate) fn read_sealed<T: DeserializeOwned>(
     max_bytes: u64,
     again: &str,
 ) -> Result<(T, String)> {
-    let (begin, end) = ends(&mut open(path)?).map_err(|e| Error::io(path, "read", e))?;
-    let wrong = |problem: String| Error::input(Place::file(path), problem, again);
-    check_begin(kind, &begin).map_err(wrong)?;
-    if !end.ends_with(b"}\n") {
-        return Err(wrong(format!("this is no whole {kind}: it was cut off or added to")));
+    let (content, sha256, mut rest) = read_sealed_line(kind, path, max_bytes, again)?;
+    if !rest.fill_buf().map_err(|e| Error::io(path, "read", e))?.is_empty() {
+        return Err(Error::input(Place::file(path), format!("this is no whole {kind}: it was added to"), again));
     }
-    unseal(kind, &read(path, max_bytes)?, &Place::file(path), again)
+    Ok((content, sha256))
 }
 
 /// The header of a sealed file, before its content.
+#[derive(Deserialize)]
 struct Head {
-    kind: String,
+    lanesweep: String,
     version: u64,
-    /// `None` before version 2.
-    engine: Option<u64>,
-}
-
-impl Head {
-    /// Checks whether this program may use the file.
-    fn check(&self) -> std::result::Result<(), String> {
-        if self.version != VERSION {
-            return Err(format!("its version is {}, this program reads {VERSION}", self.version));
-        }
-        match self.engine {
-            Some(ENGINE_VERSION) => Ok(()),
-            Some(engine) => Err(format!(
-                "it is of engine {engine}, this program has engine {ENGINE_VERSION}: their lanes differ, and are never \
-                 mixed"
-            )),
-            None => Err("it does not tell its engine".to_owned()),
-        }
-    }
+    engine: u64,
 }
 
 /// Checks whether a text begins as a sealed file of this kind that this program may use.
-fn check_begin(kind: &str, text: &[u8]) -> std::result::Result<(), String> {
+pub(super) fn check_begin(kind: &str, text: &[u8]) -> std::result::Result<(), String> {
     match head_of(text) {
-        None => Err(format!("this is no whole {kind}")),
-        Some(head) if head.kind != kind => Err(format!("this is a `{}`, where a `{kind}` is needed", head.kind)),
-        Some(head) => head.check(),
+        None => Err(format!("this is no {kind} of lanesweep")),
+        Some(head) if head.lanesweep != kind => {
+            Err(format!("this is a `{}`, where a `{kind}` is needed", head.lanesweep))
+        }
+        Some(Head { version, .. }) if version != VERSION => {
+            Err(format!("its version is {version}, this program reads {VERSION}"))
+        }
+        Some(Head { engine, .. }) => check_engine(Some(engine)),
+    }
+}
+
+/// Checks whether lanes were computed by this program's engine.
+pub(crate) fn check_engine(engine: Option<u64>) -> std::result::Result<(), String> {
+    match engine {
+        Some(ENGINE_VERSION) => Ok(()),
+        Some(engine) => Err(format!(
+            "it is of engine {engine}, this program has engine {ENGINE_VERSION}: their lanes differ, and are never mixed"
+        )),
+        None => Err("it has no engine number: an earlier version of lanesweep made it".to_owned()),
     }
 }
 
 /// Parses the beginning of a sealed file, as [`seal`] writes it.
 fn head_of(text: &[u8]) -> Option<Head> {
-    fn number<'a>(rest: &'a str, before: &str) -> Option<(u64, &'a str)> {
-        let rest = rest.strip_prefix(before)?;
-        let digits = rest.find(|c: char| !c.is_ascii_digit())?;
-        Some((rest[..digits].parse().ok()?, &rest[digits..]))
-    }
     let text = String::from_utf8_lossy(&text[..text.len().min(MAX_HEAD)]);
-    let (kind, rest) = text.strip_prefix("{\"lanesweep\":\"")?.split_once('"')?;
-    let (version, rest) = number(rest, ",\"version\":")?;
-    let engine = number(rest, ",\"engine\":").map(|(engine, _)| engine);
-    Some(Head { kind: kind.to_owned(), version, engine })
+    let (head, _) = text.split_once(",\"sha256\"")?;
+    serde_json::from_str(&format!("{head}}}")).ok()
 }
 
 /// Maximum number of bytes that hold the kind and versions of a sealed file.
@@ -189,7 +174,7 @@ pub(crate) fn kind_of(path: &Path) -> Result<String> {
     let mut text = Vec::new();
     let file = open(path)?;
     file.take(MAX_HEAD as u64).read_to_end(&mut text).map_err(|e| Error::io(path, "read", e))?;
-    head_of(&text).map(|head| head.kind).ok_or_else(|| {
+    head_of(&text).map(|head| head.lanesweep).ok_or_else(|| {
         let help = "give a file or folder that a run in parts has written";
         Error::input(Place::file(path), "this is no whole file of a run in parts", help)
     })

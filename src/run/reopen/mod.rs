@@ -12,7 +12,7 @@ use std::path::Path;
 pub use traced::{TracedCase, TracedLane, TracedLanes};
 
 use crate::parts::{PLAN_FILE, kind_of};
-use crate::sampling::{ESTIMATE_RECORD, Sample, SampleKind};
+use crate::sampling::{ESTIMATE_RECORD, SAMPLING_PLAN, Sample, SampleKind};
 use crate::study::{STUDY_RECORD, Study, StudyOptions, plan_study};
 use lanesweep_engine::{Headway, LaneKey, LanePlan};
 use lanesweep_model::driver::ModelId;
@@ -63,7 +63,7 @@ impl Reopened {
             return Err(Error::input(Place::file(dir), "there is no run here", help));
         }
         match kind_of(&plan)?.as_str() {
-            kind if Sample::is_kind(kind) => match Sample::read(&plan)? {
+            SAMPLING_PLAN => match Sample::read(&plan)? {
                 Sample { kind: SampleKind::Crude(plan), density, .. } => Ok(Reopened::sample(*plan, density)),
                 _ => {
                     let help = "give the folder of a run of crude Monte Carlo";

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use crate::parts::{PLAN_FILE, RUN_PLAN_FILE, kind_of};
+use crate::parts::{PLAN_FILE, RUN_PLAN_FILE, check_engine, kind_of};
 use crate::sampling::{ESTIMATE_RECORD, Estimator, SampleHeadways, SampleOptions, plan_samples};
 use crate::study::{STUDY_RECORD, Study};
-use lanesweep_engine::{ENGINE_VERSION, Headway, LanePlan};
+use lanesweep_engine::{Headway, LanePlan};
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::profile::Profile;
 use lanesweep_stats::density::{DensityModel, read_density};
@@ -73,17 +73,6 @@ pub(super) fn sample_of(dir: &Path) -> Result<(LanePlan, DensityModel)> {
         return Err(wrong("its plan does not match the density and the profile beside it".to_owned()));
     }
     Ok((plan, density))
-}
-
-/// Checks whether a record was made with this program's engine version.
-fn check_engine(recorded: Option<u64>) -> std::result::Result<(), String> {
-    match recorded {
-        Some(ENGINE_VERSION) => Ok(()),
-        Some(engine) => {
-            Err(format!("it is of engine {engine}, this program has engine {ENGINE_VERSION}: its lanes differ"))
-        }
-        None => Err("it has no engine number: an earlier version of lanesweep made it".to_owned()),
-    }
 }
 
 /// The study of a folder: the plan in the same folder that has the record's hash.

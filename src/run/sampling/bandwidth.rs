@@ -25,8 +25,8 @@ const AGREE: f64 = 1.25;
 /// An interval that reaches beyond this factor does not tell whether they do.
 const TELLING: f64 = 2.0;
 
-/// What the interval of the bandwidth does to a probability.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+/// What the interval of the bandwidth does to a probability; the worst first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BandwidthVerdict {
     /// P differs at an end, beyond chance and by more than a quarter.
@@ -100,12 +100,9 @@ impl Sample {
         for row in &mut result.rows {
             let [Some(narrow), Some(wide)] = row.at_bandwidths else { continue };
             let verdicts = [narrow, wide].map(|of| of.verdict(row.estimate.probability, row.draws));
-            let has = |verdict| verdicts.contains(&verdict);
-            row.bandwidth = [BandwidthVerdict::Decides, BandwidthVerdict::Open, BandwidthVerdict::Agrees]
-                .into_iter()
-                .find(|of| has(*of));
+            row.bandwidth = verdicts.into_iter().min();
             let warning = Warning::BandwidthDecides { narrow: narrow.probability, wide: wide.probability };
-            row.estimate.trust.warn_if(has(BandwidthVerdict::Decides), warning);
+            row.estimate.trust.warn_if(row.bandwidth == Some(BandwidthVerdict::Decides), warning);
         }
         Ok(result)
     }

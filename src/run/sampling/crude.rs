@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::estimate_rows::{EstimateRow, crude_rows};
 use super::sample_options::SampleOptions;
+use super::sample_run::SampleCounts;
 use crate::parts::{Computed, EachChunk, Ledger};
 use lanesweep_engine::{Executor, LanePlan, SampleTally, SweepSummary, Wanted};
 use lanesweep_model::criterion::Criterion;
@@ -63,7 +64,7 @@ pub(super) fn checkpoints(samples: u64) -> Vec<u64> {
 /// [`Error::Interrupted`].
 pub(super) fn sample_into(
     plan: &LanePlan,
-    ledger: &mut Ledger<SampleTally>,
+    ledger: &mut Ledger<SampleCounts>,
     executor: &Executor,
     options: &SampleOptions,
     exposure: Option<&Exposure>,
@@ -99,7 +100,7 @@ pub(super) fn sample_into(
                     SampleTally::check_counted(plan, &chunk, &executor.backend.describe())?;
                 }
                 each.as_mut().map_or(Ok(()), |each| each(plan, &chunk))?;
-                ledger.add(SampleTally::of_chunk(plan, &chunk)?, chunk.redone_and_rechecked)
+                ledger.add(SampleCounts::Crude(SampleTally::of_chunk(plan, &chunk)?), chunk.redone_and_rechecked)
             });
             summary.add(&ledger.kept(part)?);
         }
@@ -110,7 +111,8 @@ pub(super) fn sample_into(
         let reason = match options.stop.is_fixed() {
             true => (at >= range.end).then_some(StopReason::Samples),
             false => {
-                tally = ledger.counts(before..at)?.into_iter().try_fold(tally, SampleTally::merge)?;
+                let found = ledger.counts(before..at)?.and_then(SampleCounts::crude);
+                tally = found.into_iter().try_fold(tally, SampleTally::merge)?;
                 let rows = crude_rows(plan, &tally, options, exposure, StopReason::Samples);
                 stopped(options, &rows, at, range.end, started)
             }

@@ -151,27 +151,19 @@ impl EstimateRow {
         let of_draws = self.estimate.variance;
         (self.estimate, self.failing_scenarios) = (estimate, Some(failing_scenarios));
         self.risk = Risk::of(&self.estimate, exposure);
-        self.with_sources(of_draws, exposure)
+        let square = self.estimate.probability.powi(2);
+        let of_data = (self.estimate.variance - of_draws).max(0.0);
+        let rate = exposure.and_then(|exposure| exposure.per_hour.or(exposure.per_kilometre));
+        let of_rate = rate.map_or(0.0, |rate| (rate.standard_deviation / rate.estimate).powi(2));
+        // The variance of ln X is about ln(1 + relative variance of X).
+        self.uncertainty = Uncertainty::new([of_draws / square, of_data / square, of_rate].map(libm::log1p));
+        self
     }
 
     /// Half the width of the draws' interval over the probability, which more samples reduce; ∞ at zero.
     pub(crate) fn draws_half_width(&self) -> f64 {
         let [low, high] = self.draws;
         Interval { low, high, ..self.estimate.interval }.relative_half_width(self.estimate.probability)
-    }
-}
-
-impl EstimateRow {
-    /// The sources of the uncertainty, once the row includes that of the data. `of_draws` is the variance of the draws.
-    pub(super) fn with_sources(mut self, of_draws: f64, exposure: Option<&Exposure>) -> EstimateRow {
-        let square = self.estimate.probability.powi(2);
-        let of_data = (self.estimate.variance - of_draws).max(0.0);
-        let rate = exposure.and_then(|exposure| exposure.per_hour.or(exposure.per_kilometre));
-        let of_rate = rate.map_or(0.0, |rate| (rate.standard_deviation / rate.estimate).powi(2));
-        // The variance of ln X is about ln(1 + relative variance of X).
-        let parts = [of_draws / square, of_data / square, of_rate].map(libm::log1p);
-        self.uncertainty = Uncertainty::new(parts);
-        self
     }
 }
 

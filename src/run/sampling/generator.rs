@@ -8,7 +8,7 @@ use lanesweep_engine::generated::{
 use lanesweep_model::profile::{CutOutEvaluated, CutOutTarget, Profile};
 use lanesweep_model::scalar::Real;
 use lanesweep_model::scenario::Category;
-use lanesweep_model::scenario::parameterization::{AfterDuration, ReducedSeries, Sizes, Variable};
+use lanesweep_model::scenario::parameterization::{AfterDuration, Parameter, ReducedSeries, Sizes, Variable};
 use lanesweep_random::Stream;
 use lanesweep_stats::density::{Kde, ParameterSpace};
 use lanesweep_support::{Error, Place, Result, option};
@@ -94,12 +94,7 @@ fn recipe(space: &ParameterSpace, sizes: &Sizes, profile: &Profile) -> Result<Re
     }
     let (mut lower, mut upper) = ([f32::MIN; MAX_PARAMETERS], [f32::MAX; MAX_PARAMETERS]);
     for (j, parameter) in space.drawn_parameters().iter().enumerate() {
-        if let Some(bound) = parameter.lower {
-            lower[j] = at_least(bound, parameter.lower_excluded);
-        }
-        if let Some(bound) = parameter.upper {
-            upper[j] = at_most(bound);
-        }
+        (lower[j], upper[j]) = ends(parameter);
     }
     // A kinematic lane change covers one lane, whatever the scenarios' lanes are.
     let lane_change_m = space.options().lane_change_m;
@@ -181,6 +176,12 @@ fn at_most(bound: f64) -> f32 {
     if f64::from(rounded) <= bound { rounded } else { rounded.next_down() }
 }
 
+/// Both ends of a parameter's range in the lane arithmetic.
+fn ends(parameter: &Parameter) -> (f32, f32) {
+    let lower = parameter.lower.map_or(f32::MIN, |lower| at_least(lower, parameter.lower_excluded));
+    (lower, parameter.upper.map_or(f32::MAX, at_most))
+}
+
 /// Bounds of a draw's reconstruction.
 fn bounds(space: &ParameterSpace) -> Result<[ColumnBound; MAX_BOUNDS]> {
     let mut bounds = [ColumnBound::default(); MAX_BOUNDS];
@@ -188,13 +189,9 @@ fn bounds(space: &ParameterSpace) -> Result<[ColumnBound; MAX_BOUNDS]> {
         return Err(Error::Internal(format!("{} has more than {MAX_BOUNDS} bounded columns", space.id().name())));
     }
     for (bound, bounded) in bounds.iter_mut().zip(space.bounded_columns()) {
-        let parameter = &bounded.parameter;
-        *bound = ColumnBound {
-            column: bounded.column as u32,
-            is_distance: u32::from(bounded.is_distance),
-            lower: parameter.lower.map_or(f32::MIN, |lower| at_least(lower, parameter.lower_excluded)),
-            upper: parameter.upper.map_or(f32::MAX, at_most),
-        };
+        let (lower, upper) = ends(&bounded.parameter);
+        *bound =
+            ColumnBound { column: bounded.column as u32, is_distance: u32::from(bounded.is_distance), lower, upper };
     }
     Ok(bounds)
 }

@@ -30,11 +30,12 @@ pub(crate) use generator::recipe_without_parameters;
 pub use generator::{SAMPLE_PURPOSE, generator_of, generator_of_points};
 pub use limit_state::{LaneLimitState, limit_state, truncated};
 pub use plan::{plan_points, plan_samples};
-use plan_file::{KIND, SEARCH_FILE};
+pub(crate) use plan_file::KIND as SAMPLING_PLAN;
+use plan_file::SEARCH_FILE;
 pub use proposal_file::{proposal_from_text, proposal_text, read_proposal};
 pub use result::SampleResult;
 pub use sample_options::{Estimator, Question, SampleHeadways, SampleOptions};
-pub use sample_run::{CrudeJob, ESTIMATE_RECORD, SampleJob, WeightedJob};
+pub use sample_run::{ESTIMATE_RECORD, SampleCounts};
 pub use uncertainty::Uncertainty;
 pub use weighted::WeightedTally;
 
@@ -54,7 +55,7 @@ use lanesweep_support::{Error, Result};
 /// ```
 /// use lanesweep::engine::{CpuBackend, Executor, Headway};
 /// use lanesweep::model::profile::Profile;
-/// use lanesweep::run::parts::Shard;
+/// use lanesweep::run::parts::{Job, Shard};
 /// use lanesweep::run::sampling::{Estimator, Sample, SampleHeadways, SampleOptions};
 /// # use lanesweep::scenario::Category;
 /// # use lanesweep::scenario::parameterization::Parameterization;
@@ -152,11 +153,6 @@ impl Sample {
         }
         let first = self.density.kde.points()[0].clone();
         plan_points(&self.density, &[first], &self.profile, &self.options.models, &self.options.headways).map(drop)
-    }
-
-    /// Whether a sealed file of this kind is the plan of a sampling run.
-    pub(crate) fn is_kind(kind: &str) -> bool {
-        kind == KIND
     }
 
     /// The plan of crude Monte Carlo; its lanes have indices.

@@ -67,38 +67,26 @@ fn plan(
     models: &[ModelId],
     headways: &SampleHeadways,
 ) -> Result<LanePlan> {
+    let refused = |problem: &str, help: String| Err(Error::usage(Place::option("thw"), problem, help));
+    let fit_with = format!("fit it with {}, or give a headway in seconds", option("with_thw"));
     let headways = match (headways, density.space.has_thw()) {
         (SampleHeadways::Sampled, true) => vec![Headway::GapM(0.0)],
         (SampleHeadways::Sampled, false) => {
-            return Err(Error::usage(
-                Place::option("thw"),
+            return refused(
                 "this density has no parameter `thw_s`, so observed headways cannot be drawn from it",
-                format!("fit it with {}, or give a headway in seconds", option("with_thw")),
-            ));
+                fit_with,
+            );
         }
         (SampleHeadways::Each(_), true) => {
-            return Err(Error::usage(
-                Place::option("thw"),
-                "this density draws the headway itself (parameter `thw_s`)",
-                format!("use {}, or fit it without {}", option("thw = sampled"), option("with_thw")),
-            ));
+            let help = format!("use {}, or fit it without {}", option("thw = sampled"), option("with_thw"));
+            return refused("this density draws the headway itself (parameter `thw_s`)", help);
         }
         (SampleHeadways::Each(list), false) if Headway::is_observed(list) => {
-            return Err(Error::usage(
-                Place::option("thw"),
-                "this density has no observed headways (parameter `thw_s`)",
-                format!("fit it with {}, or give a headway in seconds", option("with_thw")),
-            ));
+            return refused("this density has no observed headways (parameter `thw_s`)", fit_with);
         }
         (SampleHeadways::Each(list), false) => list.clone(),
     };
     let id = density.space.id();
-    let block = Block {
-        category: id.category,
-        units: Units::Numbered(samples),
-        variants: vec![id.key.to_string()],
-        first_unit: 0,
-        first_lane: 0,
-    };
+    let block = Block::new(id.category, Units::Numbered(samples), vec![id.key.to_string()]);
     LanePlan::new(profile.clone(), models.to_vec(), headways, vec![block], Arc::new(generator))
 }

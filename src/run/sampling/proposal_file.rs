@@ -21,9 +21,6 @@ struct File {
     parameters: Vec<String>,
     /// SHA-256 of the density that it was made for.
     density_sha256: String,
-    /// In files of earlier versions: the form of that density.
-    #[serde(default, skip_serializing)]
-    density_form: Option<String>,
     weights: Vec<f64>,
     means: Vec<Vec<f64>>,
     /// Lower-triangular factors of the covariances, row by row, one per component.
@@ -44,7 +41,6 @@ pub fn proposal_text(density: &DensityModel, proposal: &Mixture) -> Result<Strin
         lanesweep_proposal: VERSION,
         parameters: names(density),
         density_sha256: density.content_sha256()?,
-        density_form: None,
         weights: proposal.weights().to_vec(),
         means: components.clone().map(|k| proposal.mean(k).to_vec()).collect(),
         factors: components.map(|k| proposal.factor(k).transpose().as_slice().to_vec()).collect(),
@@ -84,9 +80,6 @@ pub fn proposal_from_text(text: &[u8], density: &DensityModel, place: &Place) ->
         let problem =
             format!("it is over {}, the density over {}", file.parameters.join(", "), names(density).join(", "));
         return Err(wrong(problem));
-    }
-    if let Some(form) = file.density_form.filter(|form| form != "kernel") {
-        return Err(wrong(format!("it was made for a density of form {form}, and is over other coordinates")));
     }
     let (n, d) = (file.means.len(), file.parameters.len());
     if file.factors.iter().any(|factor| factor.len() != d * d) {

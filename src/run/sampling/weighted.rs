@@ -9,6 +9,7 @@ use super::estimate_rows::EstimateRow;
 use super::limit_state::{LaneLimitState, scenario_shares, truncated};
 use super::result::SampleResult;
 use super::sample_options::Question;
+use super::sample_run::SampleCounts;
 use super::{Sample, Weighted};
 use crate::parts::{Ledger, MergeableCounts};
 use lanesweep_engine::{CpuBackend, Executor, lanes_within_seconds};
@@ -80,7 +81,7 @@ impl Sample {
     pub(crate) fn sample_weighted(
         &self,
         weighted: &Weighted,
-        ledger: &mut Ledger<WeightedTally>,
+        ledger: &mut Ledger<SampleCounts>,
         executor: &Executor,
     ) -> Result<()> {
         let nominal = truncated(&self.density)?;
@@ -93,7 +94,8 @@ impl Sample {
             while at < missing.end {
                 let next = (at / chunk + 1).saturating_mul(chunk).min(missing.end);
                 let sums = importance_sums(&nominal, &weighted.proposal, &lanes, &weighted.draws, at..next)?;
-                ledger.add(WeightedTally { sums: self.options.asked().into_iter().zip(sums).collect() }, [0; 2])?;
+                let sums = self.options.asked().into_iter().zip(sums).collect();
+                ledger.add(SampleCounts::Weighted(WeightedTally { sums }), [0; 2])?;
                 executor.progress.iter().for_each(|progress| progress(next - at));
                 at = next;
                 ledger.kept(executor.check_cancelled(at - units.start, units.end - units.start))?;
@@ -109,14 +111,13 @@ impl Sample {
     pub(super) fn weighted_result(
         &self,
         weighted: &Weighted,
-        tally: Option<WeightedTally>,
+        counts: Option<SampleCounts>,
         place: Place,
     ) -> Result<SampleResult> {
         let (options, exposure) = (&self.options, self.exposure());
-        let all = 0..self.samples();
-        let Some(tally) = tally.filter(|tally| tally.covered().as_slice() == std::slice::from_ref(&all)) else {
-            let problem = "the parts do not hold every sample";
-            return Err(Error::input(place, problem, "make them again"));
+        let counts = counts.filter(|counts| counts.covered().first() == Some(&(0..self.samples())));
+        let Some(SampleCounts::Weighted(tally)) = counts else {
+            return Err(Error::input(place, "the parts do not hold every sample", "make them again"));
         };
         // Some more lanes, on the CPU: a merge has no other backend, and all backends give the same bits.
         let cpu = CpuBackend::lane_arithmetic();

@@ -152,12 +152,11 @@ fn check_claim(claim: Claim, of: Scenarios, table: &ScoreTable) -> ClaimResult {
     let statistic = claim.statistic;
     let paper = Headway::paper();
     let has_headways = table.headways.len() == paper.len() && paper.iter().all(|h| table.headways.contains(h));
-    let is_runnable = has_headways
-        && statistic.variants().iter().all(|v| of.scores.variant(v).is_some())
-        && statistic.models().iter().all(|m| of.scores.models.contains(m));
+    let is_runnable = has_headways && statistic.variants().iter().all(|v| of.scores.variant(v).is_some());
     let row = |&cell: &(ModelId, Criterion)| {
-        let failing_scenarios = of.failing(&statistic.judged_by(cell));
-        let has_run = is_runnable && of.scores.models.contains(&cell.0);
+        let compared = statistic.judged_by(cell);
+        let failing_scenarios = of.failing(&compared);
+        let has_run = is_runnable && compared.iter().all(|(model, _)| of.scores.models.contains(model));
         let measured = statistic.value(of, cell, table.options.confidence).filter(|_| has_run);
         let verdict = match measured {
             _ if !has_run => ClaimVerdict::NotRun,

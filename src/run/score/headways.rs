@@ -3,13 +3,11 @@
 use lanesweep_engine::{Headway, LanePlan, Partial};
 use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::ModelId;
-use lanesweep_support::{Error, Result};
+use lanesweep_support::Result;
 
 /// Failed lanes of one category by headway.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeadwayFailures {
-    /// Names of the variants.
-    pub variants: Vec<String>,
     /// Headways.
     pub headways: Vec<Headway>,
     /// Models.
@@ -22,25 +20,10 @@ impl HeadwayFailures {
     /// From a block of a plan.
     ///
     /// # Errors
-    /// [`Error::Internal`] if the counts do not match the plan.
+    /// As [`Partial::headway_failures`].
     pub(crate) fn of(plan: &LanePlan, partial: &Partial, block: usize) -> Result<HeadwayFailures> {
         let failures = partial.headway_failures(plan, block)?.to_vec();
-        HeadwayFailures::new(&plan.blocks[block].variants, &plan.headways, &plan.models, failures)
-    }
-
-    fn new(
-        variants: &[String],
-        headways: &[Headway],
-        models: &[ModelId],
-        failures: Vec<u64>,
-    ) -> Result<HeadwayFailures> {
-        let expected = variants.len() * headways.len() * models.len() * Criterion::ALL.len();
-        if failures.len() != expected {
-            let problem = format!("{} counts of failures by headway, expected {expected}", failures.len());
-            return Err(Error::Internal(problem));
-        }
-        let (variants, headways, models) = (variants.to_vec(), headways.to_vec(), models.to_vec());
-        Ok(HeadwayFailures { variants, headways, models, failures })
+        Ok(HeadwayFailures { headways: plan.headways.clone(), models: plan.models.clone(), failures })
     }
 
     /// Failed lanes of a variant at a headway; models and criteria by their indices in the plan.

@@ -15,11 +15,9 @@ pub enum Statistic {
     F1Below(&'static str, f64),
     /// F1 difference of two variants, claimed to be nearly 0.
     F1Near(&'static str, &'static str),
-    /// (FP − FN)/(2TP + FP + FN), mean over variants: > 0 if false positives dominate. It has the sign of recall −
-    /// precision and is defined even if S' never fails.
-    FalsePositivesDominate(&'static [&'static str]),
-    /// The same with the opposite sign: > 0 if false negatives dominate.
-    FalseNegativesDominate(&'static [&'static str]),
+    /// ±(FP − FN)/(2TP + FP + FN), mean over variants, with the sign of the factor: > 0 if false positives (1), or false
+    /// negatives (−1), dominate. It has the sign of recall − precision and is defined even if S' never fails.
+    ErrorsDominate(&'static [&'static str], f64),
     /// Minimum failure rate of S among the first models minus the maximum among the others, same criterion.
     FailsMoreOften(&'static [ModelId], &'static [ModelId]),
     /// Failure rate of S in this criterion minus that in another one, same model.
@@ -85,13 +83,6 @@ impl Statistic {
             let pair = move |k: usize| (first..first + second).map(move |l| Contrast::difference(k, l));
             (0..first).flat_map(pair).collect::<Vec<_>>()
         };
-        let excess = |variants: &[&str], sign: f64| {
-            let rates = variants.iter().flat_map(|v| [of.share(v, cell, |c| c.fp), of.share(v, cell, |c| c.fn_)]);
-            let rates = rates.collect::<Option<Vec<_>>>()?;
-            let factor = |at: usize| sign / variants.len() as f64 * if at.is_multiple_of(2) { 1.0 } else { -1.0 };
-            let terms = (0..rates.len()).map(|at| (factor(at), at)).collect();
-            Some((rates, vec![Contrast { constant: 0.0, terms }]))
-        };
         let (rates, contrasts) = match *self {
             Statistic::F1Above(better, worse) => {
                 let rates = better.iter().chain(worse).map(f1).collect::<Option<Vec<_>>>()?;
@@ -101,8 +92,12 @@ impl Statistic {
                 (vec![f1(&variant)?], vec![Contrast { constant: bound, terms: vec![(-1.0, 0)] }])
             }
             Statistic::F1Near(a, b) => (vec![f1(&a)?, f1(&b)?], pairs(1, 1)),
-            Statistic::FalsePositivesDominate(variants) => excess(variants, 1.0)?,
-            Statistic::FalseNegativesDominate(variants) => excess(variants, -1.0)?,
+            Statistic::ErrorsDominate(variants, sign) => {
+                let rates = variants.iter().flat_map(|v| [of.share(v, cell, |c| c.fp), of.share(v, cell, |c| c.fn_)]);
+                let factor = |at: usize| sign / variants.len() as f64 * if at.is_multiple_of(2) { 1.0 } else { -1.0 };
+                let terms = (0..2 * variants.len()).map(|at| (factor(at), at)).collect();
+                (rates.collect::<Option<Vec<_>>>()?, vec![Contrast { constant: 0.0, terms }])
+            }
             Statistic::FailsMoreOften(often, seldom) => {
                 let models = often.iter().chain(seldom);
                 let rates = models.map(|m| of.failures(*m, criterion)).collect::<Option<Vec<_>>>()?;
@@ -124,21 +119,13 @@ impl Statistic {
         }
     }
 
-    /// The compared models other than the cell's own.
-    pub(super) fn models(&self) -> Vec<ModelId> {
-        match *self {
-            Statistic::FailsMoreOften(often, seldom) => [often, seldom].concat(),
-            _ => Vec::new(),
-        }
-    }
-
     /// The required variants.
     pub(super) fn variants(&self) -> Vec<&'static str> {
         match *self {
             Statistic::F1Above(a, b) => [a, b].concat(),
             Statistic::F1Below(v, _) => vec![v],
             Statistic::F1Near(a, b) => vec![a, b],
-            Statistic::FalsePositivesDominate(v) | Statistic::FalseNegativesDominate(v) => v.to_vec(),
+            Statistic::ErrorsDominate(v, _) => v.to_vec(),
             Statistic::FailsMoreOften(..) | Statistic::FailsMoreThan(_) => vec!["S"],
         }
     }

@@ -11,7 +11,7 @@ use lanesweep_engine::lane_case::LaneCase;
 use lanesweep_engine::plan::{Block, LanePlan, Units, check_cases};
 use lanesweep_engine::{CaseTable, Chunk, Executor, SweepSummary, Wanted};
 use lanesweep_model::scenario::parameterization::{
-    Parameterization, ParameterizationOptions, Reduction, Sizes, TimeGrid, recorded_case, steps_of,
+    Parameterization, Reduction, Sizes, TimeGrid, recorded_case, steps_of,
 };
 use lanesweep_model::scenario::{Case, Category, Scenario};
 use lanesweep_support::{Error, Place, Result};
@@ -164,14 +164,14 @@ impl StudyCases {
         let scenario = self.scenario(block.first_unit + unit);
         let scenario = scenario.ok_or_else(|| Error::Internal(format!("scenario {unit} of a study is not held")))?;
         let reduction = self.reductions[at].as_ref();
-        let ids: Vec<Parameterization> = parameterizations(block.category, reduction.is_some()).collect();
-        let grid = TimeGrid::of(&self.outline.profile);
-        let mut cases = cases_of(scenario, &ids, reduction, grid, &self.head.parameterization)?;
-        if !self.folds[at].is_empty() {
-            let fold = scenario.fold.and_then(|fold| self.folds[at].get(fold));
-            let options = &self.head.parameterization;
-            let held_out = decompositions(block.category).map(|id| id.case(scenario, grid, options, fold));
-            cases.extend(held_out.collect::<Result<Vec<_>>>()?);
+        let (grid, options) = (TimeGrid::of(&self.outline.profile), &self.head.parameterization);
+        let mut cases = vec![recorded_case(scenario, grid)?];
+        for id in parameterizations(block.category, reduction.is_some()) {
+            cases.push(id.case(scenario, grid, options, reduction)?);
+        }
+        let fold = scenario.fold.and_then(|fold| self.folds[at].get(fold));
+        for id in decompositions(block.category).filter(|_| !self.folds[at].is_empty()) {
+            cases.push(id.case(scenario, grid, options, fold)?);
         }
         let sizes = Sizes::of(scenario);
         for replay in &scenario.replays {
@@ -204,19 +204,4 @@ pub(super) fn entries_per_step(category: Category, ids: impl Iterator<Item = Par
         Category::Lvd => 1,
     };
     (sampled * series) as f64
-}
-
-/// S, then every S', of one scenario.
-fn cases_of(
-    scenario: &Scenario,
-    ids: &[Parameterization],
-    reduction: Option<&Reduction>,
-    grid: TimeGrid,
-    options: &ParameterizationOptions,
-) -> Result<Vec<Case>> {
-    let mut cases = vec![recorded_case(scenario, grid)?];
-    for id in ids {
-        cases.push(id.case(scenario, grid, options, reduction)?);
-    }
-    Ok(cases)
 }

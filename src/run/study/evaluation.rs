@@ -43,14 +43,10 @@ impl Study {
     pub fn evaluate(&self, counts: &Partial) -> Result<StudyEvaluation> {
         let plan = self.plan();
         let scores = self.score(counts)?;
-        let mut capped = self.capped_min_ttc_s(counts)?;
-        let mut numbers = |block: usize| {
-            Ok(CategoryNumbers {
-                headways: HeadwayFailures::of(plan, counts, block)?,
-                capped_min_ttc_s: std::mem::take(&mut capped[block]),
-            })
+        let numbers = |(block, capped_min_ttc_s)| {
+            Ok(CategoryNumbers { headways: HeadwayFailures::of(plan, counts, block)?, capped_min_ttc_s })
         };
-        let categories = (0..plan.blocks.len()).map(&mut numbers).collect::<Result<_>>()?;
+        let categories = self.capped_min_ttc_s(counts)?.into_iter().enumerate().map(numbers).collect::<Result<_>>()?;
         let claims = check_claims(&scores, plan, counts);
         let best = best_parameterizations(&scores, plan, counts, Criterion::Collision);
         Ok(StudyEvaluation { scores, claims, best, categories })

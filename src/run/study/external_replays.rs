@@ -107,7 +107,8 @@ impl ExternalReplay {
             return Err(Error::input(Place::file(path), problem, "give all kept scenarios of a category, or none"));
         }
         let pairs: Vec<_> = scenarios.iter().filter_map(|s| Some((s, self.scenarios.get(&s.id)?))).collect();
-        let (file, category) = (path.display(), self.category.label());
+        let category = self.category.label();
+        let warn = |problem: String| tracing::warn!("{}: {problem}", path.display());
         // Left-out samples shorten every S' by one factor.
         let mut times: Vec<f64> = pairs.iter().map(|(s, own)| own.duration_s / s.duration_s()).collect();
         times.sort_by(f64::total_cmp);
@@ -116,7 +117,7 @@ impl ExternalReplay {
             && most < 1.1 * least
         {
             let times = readable::value(least);
-            tracing::warn!("{file}: every S' ({category}) lasts {times} times as long as its scenario: check `fps`");
+            warn(format!("every S' ({category}) lasts {times} times as long as its scenario: check `fps`"));
         }
         let mut shorter_s: Vec<f64> = pairs.iter().map(|(s, own)| s.duration_s() - own.duration_s).collect();
         shorter_s.sort_by(f64::total_cmp);
@@ -124,14 +125,14 @@ impl ExternalReplay {
         let as_much = shorter_s.iter().filter(|s| (*s - by_s).abs() < 0.01).count();
         if by_s > 0.1 && as_much > 2 && 4 * as_much > 3 * pairs.len() {
             let by_s = readable::value(by_s);
-            tracing::warn!(
-                "{file}: {as_much} S' ({category}) are {by_s} s shorter than their scenarios: their first or last samples are missing"
-            );
+            warn(format!(
+                "{as_much} S' ({category}) are {by_s} s shorter than their scenarios: their first or last samples are missing"
+            ));
         }
         let is_same =
             |(s, own): &(&Scenario, &ReducedScenario)| s.target.v == own.v && (own.y.is_empty() || s.target.y == own.y);
         if pairs.iter().all(is_same) {
-            tracing::warn!("{file}: every S' ({category}) has the series of its scenario: it is S itself");
+            warn(format!("every S' ({category}) has the series of its scenario: it is S itself"));
         }
         type Of<'a> = &'a dyn Fn(&Scenario, &ReducedScenario) -> f64;
         let sum = |of: Of| pairs.iter().map(|(s, own)| of(s, own)).sum::<f64>();
@@ -139,14 +140,14 @@ impl ExternalReplay {
         let times = sum(&|_, own| widest(&own.y)) / sum(&|s, _| widest(&s.target.y));
         if self.category != Category::Lvd && !(0.7..=1.4).contains(&times) {
             let times = readable::value(times);
-            tracing::warn!(
-                "{file}: S' ({category}) move {times} times as far to the side as their scenarios: check the unit of y"
-            );
+            warn(format!(
+                "S' ({category}) move {times} times as far to the side as their scenarios: check the unit of y"
+            ));
         }
         let times = sum(&|_, own| own.lead_gap_m) / sum(&|s, _| s.lead_gap.unwrap_or(0.0));
         if self.category == Category::CutOut && !(0.8..=1.25).contains(&times) {
             let times = readable::value(times);
-            tracing::warn!("{file}: `D` is {times} times that of the scenarios on average: check its unit and meaning");
+            warn(format!("`D` is {times} times that of the scenarios on average: check its unit and meaning"));
         }
         let first = |of: &[f64]| of.first().copied().unwrap_or(0.0);
         // What no parameterization changes.
@@ -165,7 +166,7 @@ impl ExternalReplay {
         for (what, differs) in differences {
             let others = pairs.iter().filter(|(s, own)| differs(s, own)).count();
             if 2 * others > pairs.len() {
-                tracing::warn!("{file}: {others} of {} S' ({category}) {what}", pairs.len());
+                warn(format!("{others} of {} S' ({category}) {what}", pairs.len()));
             }
         }
         // Rows that were shifted or sorted have the ids of other scenarios.
@@ -177,11 +178,11 @@ impl ExternalReplay {
         let next = pairs.iter().cycle().skip(1);
         let near = pairs.iter().copied().zip(next).filter(is_nearer).count();
         if pairs.len() >= 4 && 4 * near < 3 * pairs.len() {
-            tracing::warn!(
-                "{file}: the first and last speeds of only {near} of {} S' ({category}) are nearer to their own scenario than \
+            warn(format!(
+                "the first and last speeds of only {near} of {} S' ({category}) are nearer to their own scenario than \
                  to the next one: check the ids",
                 pairs.len()
-            );
+            ));
         }
         Ok(())
     }

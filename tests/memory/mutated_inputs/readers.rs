@@ -7,7 +7,7 @@ use lanesweep::engine::{Backend, CpuBackend, Headway, LanePlan, SampleTally, Wan
 use lanesweep::model::plausibility::Implausible;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::{Counted, Journal, Ledger, read_part, read_sealed_line};
-use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, plan_samples, read_proposal};
+use lanesweep::run::sampling::{Estimator, SampleCounts, SampleHeadways, SampleOptions, plan_samples, read_proposal};
 use lanesweep::run::study::{StudyHead, StudyOptions, plan_study};
 use lanesweep::scenario::DataProvenance;
 use lanesweep::scenario::parameterization::ParameterizationOptions;
@@ -195,10 +195,11 @@ fn is_that_of_the_seed(whole: &OnceLock<String>, read: String) {
 
 fn part(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
     let path = file(bytes, dir, "part.json");
-    let read = read_part::<SampleTally>(&path, "00", &PART_UNITS, "make it again")?;
+    let read = read_part::<SampleCounts>(&path, "00", &PART_UNITS, "make it again")?;
     static WHOLE: OnceLock<String> = OnceLock::new();
     is_that_of_the_seed(&WHOLE, format!("{read:?}"));
-    for tally in read.segments {
+    for counts in read.segments {
+        let SampleCounts::Crude(tally) = counts else { continue };
         tally.samples();
         tally.valid();
         let plan = small_plan(&seeds.density, &seeds.profile)?;
@@ -223,7 +224,7 @@ fn plan(bytes: &[u8], dir: &Path, _: &Seeds, heavy: bool) -> Result<()> {
 
 fn journal(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {
     let path = file(bytes, dir, "part.journal");
-    let (journal, found) = Journal::<Counted<SampleTally>>::open(&path, "00", PART_UNITS)?;
+    let (journal, found) = Journal::<Counted<SampleCounts>>::open(&path, "00", PART_UNITS)?;
     let mut ledger = Ledger::new(PART_UNITS, &[]);
     ledger.resume(journal, found)?;
     if ledger.missing(PART_UNITS)?.is_empty() {

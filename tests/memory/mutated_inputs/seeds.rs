@@ -7,7 +7,7 @@ use std::path::Path;
 use lanesweep::engine::{Backend, CpuBackend, SampleTally, Wanted};
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::{Counted, Journal, MergeableCounts, Part, seal, write_part};
-use lanesweep::run::sampling::proposal_text;
+use lanesweep::run::sampling::{SampleCounts, proposal_text};
 use lanesweep::run::study::{StudyOptions, outline_study};
 use lanesweep::scenario::parameterization::ParameterizationOptions;
 use lanesweep::scenario::{Category, Scenario, write_scenarios};
@@ -156,7 +156,9 @@ impl Seeds {
         let tally = SampleTally::of_chunk(&plan, &chunk).unwrap();
         let journal = written(|path| {
             let (mut journal, _) = Journal::open(path, "00", PART_UNITS).unwrap();
-            journal.append(&[Counted { counts: tally.clone(), redone_and_rechecked: [0; 2] }]).unwrap();
+            journal
+                .append(&[Counted { counts: SampleCounts::Crude(tally.clone()), redone_and_rechecked: [0; 2] }])
+                .unwrap();
         });
         let driven = Some(Driven { hours: Some(1.5), kilometres: Some(90.0) });
         let exposure = DataProvenance { scenarios_sha256: "00".to_owned(), driven, ..provenance() };
@@ -194,7 +196,7 @@ impl Seeds {
             ("track table", track_tables()),
             ("preset", presets()),
             ("proposal", toml(proposal_text(&density, &density.kde.mixture().unwrap()).unwrap())),
-            ("part", vec![part(PART_UNITS, tally)]),
+            ("part", vec![part(PART_UNITS, SampleCounts::Crude(tally))]),
             ("plan", vec![plan_file]),
             ("journal", vec![journal]),
         ]);

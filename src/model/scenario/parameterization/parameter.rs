@@ -24,7 +24,7 @@ const PHYSICAL_RANGES: [(&str, f64, f64); 5] =
 
 /// A number that defines a kinematic case. Its code is its slot in the recipe of a
 /// case generator.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize)]
 #[repr(u32)]
 pub enum Variable {
     /// Speed of cutter or cutting-out vehicle at t = 0, m/s; LVD: of leader and ego before the deceleration.
