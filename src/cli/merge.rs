@@ -65,8 +65,8 @@ impl Merge {
                 let table = table.map(|table| list_failures(table, &sample, &result, configured)).transpose()?;
                 let mut results = folder.results()?;
                 table.into_iter().for_each(|table| results.join(table));
-                let report = SampleReport::of_sample(&sample, &result, host)?;
-                let files = report.write(results, &sample, &result)?;
+                let report = SampleReport { sample: &sample, result: &result, host };
+                let files = report.write(results)?;
                 let output = self.format.output_in(&self.folder, Exit::Ok, || report.text(), || report.json(&files))?;
                 Ok(output.with_tables(|| files.tables))
             }

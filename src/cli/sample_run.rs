@@ -187,8 +187,8 @@ impl Sample {
         let host = configured.host(opened, result.rechecked_lanes, self.shards.plan.is_some());
         let mut results = run.results()?;
         rows.into_iter().chain(failures).for_each(|table| results.join(table));
-        let report = SampleReport::of_sample(sample, &result, host)?;
-        let files = report.write(results, sample, &result)?;
+        let report = SampleReport { sample, result: &result, host };
+        let files = report.write(results)?;
         let output = self.format.output_in(&self.out, Exit::Ok, || report.text(), || report.json(&files))?;
         run.close()?;
         Ok(output.with_tables(|| files.tables))

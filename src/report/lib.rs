@@ -26,8 +26,6 @@ pub mod openscenario;
 mod plot;
 pub mod records;
 pub mod sampling;
-mod sampling_figures;
-mod sampling_files;
 mod sampling_page;
 pub mod sampling_tables;
 pub mod study;

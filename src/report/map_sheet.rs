@@ -125,7 +125,7 @@ impl MapSheet<'_> {
                 ..Rule::default()
             }
         });
-        let axis = |title, edges: &[f64]| PlotAxis::exactly(title, edges[0], edges[edges.len() - 1]);
+        let axis = |title, edges: &[f64]| PlotAxis::new(title, edges[0], edges[edges.len() - 1]);
         Plot {
             heading: self.panel_name(panel, first),
             x: axis(self.grid.x.parameter.title(), &across),

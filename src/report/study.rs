@@ -5,7 +5,7 @@ use super::host::{Host, SweepRecord, Timings};
 use super::html::PageFigure;
 use super::plot::Figure;
 use super::records::{PROGRAM, document, publish, record};
-use super::study_figures::{f1_intervals, headways, radar};
+use super::study_figures::{f1_intervals, radar};
 use super::tables;
 use lanesweep_engine::{ENGINE_VERSION, Headway, Partial, SweepSummary};
 use lanesweep_model::criterion::Criterion;
@@ -103,14 +103,11 @@ impl<'a> StudyReport<'a> {
     /// The figures of a category, with the prefixes of their file names; figures without data are skipped.
     fn figures(&self, at: usize) -> Vec<(&'static str, Figure)> {
         let (scores, data) = (&self.evaluation.scores.categories[at], &self.facts().data);
-        let (confidence, mut figures) = (self.evaluation.scores.options.confidence, Vec::new());
-        if scores.variants.len() > 1 {
-            figures.push(("f1", f1_intervals(scores, confidence, data)));
-            figures.push(("radar", radar(scores, data)));
+        if scores.variants.len() < 2 {
+            return Vec::new();
         }
-        let numbers = &self.evaluation.categories[at];
-        figures.extend(headways(&numbers.headways, scores, confidence, data).map(|figure| ("headways", figure)));
-        figures
+        let confidence = self.evaluation.scores.options.confidence;
+        vec![("f1", f1_intervals(scores, confidence, data)), ("radar", radar(scores, data))]
     }
 }
 

@@ -12,17 +12,17 @@ mod svg;
 
 use std::f64::consts::TAU;
 
-pub(super) use axis::AxisScale;
 pub(super) use layer::{Cells, FilledCell, Mark, Rule, Series, Value};
 pub(super) use look::{Look, Symbol};
 
-pub(super) use axis::{logarithmic_reach, number, plain_end};
+pub(super) use axis::plain_end;
 use layer::{HOLLOW, fill_sample};
 pub(super) use layer::{TICK, is_few};
 pub(super) use svg::{Anchor, Canvas, GREY, INK, Type, set};
 
-use axis::{Axes, on_circle};
+use axis::{Axes, Axis, on_circle};
 use frame::{numbers_left, spoke_name};
+use lanesweep_support::readable::plain;
 use lanesweep_support::table::Table;
 use svg::{GRID, Paint, Position, WHITE};
 
@@ -106,24 +106,10 @@ pub enum Height {
 pub struct PlotAxis {
     /// Quantity and unit; wrapped when long.
     pub label: String,
-    /// Scale.
-    pub scale: AxisScale,
-    /// Ends.
-    pub ends: Ends,
+    /// Ends, the lower first.
+    pub ends: (f64, f64),
     /// Names instead of numbers.
     pub names: Vec<Name>,
-}
-
-/// Ends of an axis.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub enum Ends {
-    /// Around the values of the series.
-    #[default]
-    Layers,
-    /// Around these values.
-    Around(Vec<f64>),
-    /// Exactly these two, on a linear axis.
-    Exactly(f64, f64),
 }
 
 /// A named position on an axis.
@@ -140,31 +126,13 @@ pub struct Name {
 }
 
 impl PlotAxis {
-    /// A linear axis around the values of the series.
-    pub(crate) fn new(label: impl Into<String>) -> Self {
-        PlotAxis { label: label.into(), ..PlotAxis::default() }
+    /// An axis with these ends.
+    pub(crate) fn new(label: impl Into<String>, low: f64, high: f64) -> Self {
+        PlotAxis { label: label.into(), ends: (low, high), names: Vec::new() }
     }
 
-    /// A linear axis with these ends.
-    pub(crate) fn exactly(label: impl Into<String>, low: f64, high: f64) -> Self {
-        PlotAxis { ends: Ends::Exactly(low, high), ..PlotAxis::new(label) }
-    }
-
-    /// An axis of this scale around these values.
-    pub(crate) fn around(label: impl Into<String>, scale: AxisScale, values: Vec<f64>) -> Self {
-        PlotAxis { scale, ends: Ends::Around(values), ..PlotAxis::new(label) }
-    }
-
-    fn is_like(&self, other: &PlotAxis) -> bool {
-        self.ends != Ends::Layers && (&self.label, self.scale, &self.ends) == (&other.label, other.scale, &other.ends)
-    }
-
-    fn place(&self, values: impl Iterator<Item = f64>, ends_px: (f64, f64)) -> Option<axis::Axis> {
-        match &self.ends {
-            Ends::Exactly(low, high) => Some(axis::Axis::exactly((*low, *high), ends_px)),
-            Ends::Around(values) => axis::Axis::around(self.scale, values, ends_px),
-            Ends::Layers => axis::Axis::around(self.scale, &values.collect::<Vec<_>>(), ends_px),
-        }
+    fn place(&self, (from_px, to_px): (f64, f64)) -> Axis {
+        Axis { low: self.ends.0, high: self.ends.1, from_px, to_px }
     }
 }
 
@@ -252,15 +220,12 @@ impl Figure {
             .column("panel", |(plot, ..)| plot.heading.as_str())
             .column("row", |(plot, _, value)| plot.name_of(value).map_or("", |name| name.words.as_str()))
             .column("series", |(_, series, _)| series.name.as_str())
-            .column("label", |(.., value)| value.label.as_str())
             .column("x_quantity", |(plot, ..)| plot.x.label.as_str())
             .column("x", |(.., value)| value.x)
-            .column("x_low", |(_, series, value)| series.ends_of(value, true).map(|ends| ends.0))
-            .column("x_high", |(_, series, value)| series.ends_of(value, true).map(|ends| ends.1))
+            .column("x_low", |(_, series, value)| series.ends_of(value).map(|ends| ends.0))
+            .column("x_high", |(_, series, value)| series.ends_of(value).map(|ends| ends.1))
             .column("y_quantity", |(plot, ..)| plot.y.label.as_str())
             .column("y", |(plot, _, value)| (plot.is_polar || plot.y.names.is_empty()).then_some(value.y))
-            .column("y_low", |(_, series, value)| series.ends_of(value, false).map(|ends| ends.0))
-            .column("y_high", |(_, series, value)| series.ends_of(value, false).map(|ends| ends.1))
             .build()
     }
 
@@ -295,7 +260,11 @@ impl Figure {
     fn shares(&self, axis: fn(&Plot) -> &PlotAxis) -> bool {
         let mut shown = self.plots.iter().filter(|plot| !plot.is_blank());
         let first = shown.next();
-        self.plots.len() > 1 && first.is_some_and(|first| shown.all(|plot| axis(plot).is_like(axis(first))))
+        self.plots.len() > 1
+            && first.is_some_and(|first| {
+                let like = |plot: &Plot| (&axis(plot).label, axis(plot).ends) == (&axis(first).label, axis(first).ends);
+                shown.all(like)
+            })
     }
 
     /// Draws all plots below `top`, in rows; returns the y below.
@@ -382,7 +351,7 @@ impl Figure {
     /// Draws samples and names of what is drawn, in two columns read downwards (one if a name is too long for half the
     /// width); returns the y below.
     fn legend(&self, canvas: &mut Canvas, top: f64) -> f64 {
-        let shown = || self.plots.iter().flat_map(|plot| plot.series.iter().filter(|series| plot.shows(series)));
+        let shown = || self.plots.iter().flat_map(|plot| plot.series.iter().filter(|series| Plot::shows(series)));
         let series = self.names().into_iter().filter_map(|name| {
             let series = shown().find(|series| series.name == name)?;
             Some((name, Entry::Series(series, self.look(series))))
@@ -442,10 +411,9 @@ impl Plot {
         self.heading.is_empty() && self.cells.is_none() && self.rules.is_empty() && self.series.is_empty()
     }
 
-    /// Whether the axes can show a value of the series, or the upper end of its interval.
-    pub(super) fn shows(&self, series: &Series) -> bool {
-        let is_shown = |v: &Value| self.x.scale.shows(v.x) && self.y.scale.shows(v.y);
-        series.values.iter().any(|value| is_shown(value) || value.interval.is_some())
+    /// Whether the axes can show a value of the series.
+    fn shows(series: &Series) -> bool {
+        series.values.iter().any(Value::is_shown)
     }
 
     /// Space left and right of the frame, px.
@@ -463,16 +431,12 @@ impl Plot {
 
     /// The axes within these ends; `None` if there is nothing to show.
     fn axes(&self, across: (f64, f64), down: (f64, f64), centre: Option<Position>) -> Option<Axes> {
-        let shown = || {
-            let is_shown = |v: &&Value| self.x.scale.shows(v.x) && self.y.scale.shows(v.y);
-            self.series.iter().flat_map(|series| &series.values).filter(is_shown)
-        };
-        if !self.is_polar && !self.series.is_empty() && !self.series.iter().any(|series| self.shows(series)) {
-            return None;
-        }
-        let x = self.x.place(shown().map(|v| v.x), across)?;
-        let y = self.y.place(shown().map(|v| v.y), (down.1, down.0))?;
-        Some(Axes { x, y, centre })
+        let is_empty = !self.series.is_empty() && !self.series.iter().any(Plot::shows);
+        (self.is_polar || !is_empty).then(|| Axes {
+            x: self.x.place(across),
+            y: self.y.place((down.1, down.0)),
+            centre,
+        })
     }
 
     /// Draws the plot in a frame (across, down): axes with their numbers (below, at the left), content.
@@ -516,30 +480,19 @@ impl Plot {
         let mut taken = Vec::new();
         self.rules.iter().for_each(|rule| rule.name_at_end(canvas, axes, &mut taken));
         for series in &self.series {
-            series.markers(canvas, axes, &look(series), &|value| self.tip(series, value), &mut taken);
+            series.markers(canvas, axes, &look(series), &|value| self.tip(series, value));
         }
     }
 
     /// `FSM, collision; 2: constant acceleration; F1 0.86 [0.84 0.88]; n = 285`.
     fn tip(&self, series: &Series, value: &Value) -> String {
-        let along = |axis: &PlotAxis, at: f64, ends: Option<(f64, f64)>| {
-            let interval = ends.map(|(low, high)| format!(" [{} {}]", number(low), number(high))).unwrap_or_default();
-            let is_named = !axis.names.is_empty() || axis.label.is_empty();
-            if is_named { String::new() } else { format!("{} {}{interval}", axis.label, number(at)) }
-        };
+        let interval = series.ends_of(value);
+        let interval = interval.map(|(low, high)| format!(" [{} {}]", plain(low, 3), plain(high, 3)));
+        // The axis with numbers: the radius of a polar plot, whose rings have names too.
+        let (axis, at) = if self.is_polar { (&self.y, value.y) } else { (&self.x, value.x) };
+        let number = format!("{} {}{}", axis.label, plain(at, 3), interval.unwrap_or_default());
         let (row, note) = self.name_of(value).map_or(("", ""), |name| (&name.words, &name.note));
-        // In a polar plot the radius has names, and a quantity.
-        let y = PlotAxis { names: Vec::new(), ..self.y.clone() };
-        let y = if self.is_polar { &y } else { &self.y };
-        let words = [
-            self.heading.as_str(),
-            row,
-            &series.name,
-            &value.label,
-            &along(&self.x, value.x, series.ends_of(value, true)),
-            &along(y, value.y, series.ends_of(value, false)),
-            note,
-        ];
+        let words = [self.heading.as_str(), row, &series.name, &number, note];
         words.into_iter().filter(|word| !word.is_empty()).collect::<Vec<_>>().join("; ")
     }
 

@@ -7,9 +7,10 @@ mod lanes;
 mod panels;
 mod positions;
 
-use super::plot::{Anchor, Canvas, Ends, Figure, INK, Look, Plot, TICK, Type, number, set};
+use super::plot::{Anchor, Canvas, Figure, INK, Look, Plot, TICK, Type, set};
 pub use lanes::TraceReport;
 use lanesweep_engine::{StepMark, Trace, TracedStep};
+use lanesweep_support::readable::plain;
 use lanesweep_support::table::Table;
 use panels::{Shown, mark_look};
 pub use panels::{TracePanels, TraceSeries};
@@ -106,10 +107,8 @@ impl TraceFigure<'_> {
         if self.series.iter().any(|s| s.trace.coasting_mps2 > 0.0) {
             notes.push("CCHDM's coasting after its reaction is no braking.".to_owned());
         }
-        let is_cut = |plot: &Plot| {
-            let Ends::Exactly(_, top) = plot.y.ends else { return false };
-            plot.series.iter().flat_map(|series| &series.values).any(|value| value.y >= top)
-        };
+        let is_cut =
+            |plot: &Plot| plot.series.iter().flat_map(|series| &series.values).any(|value| value.y >= plot.y.ends.1);
         if plots.iter().any(is_cut) {
             notes.push("A curve that ends at the top edge goes on above it.".to_owned());
         }
@@ -130,7 +129,7 @@ fn thousandths(value: f64) -> String {
 }
 
 fn worst(value: f64, unit: &str) -> String {
-    if value.is_finite() { format!("{}{unit}", number(value)) } else { "∞".to_owned() }
+    if value.is_finite() { format!("{}{unit}", plain(value, 3)) } else { "∞".to_owned() }
 }
 
 const VEHICLES: [&str; 2] = ["other", "ahead"];

@@ -172,8 +172,8 @@ impl<'a> Shown<'a> {
         Plot {
             heading: title.to_owned(),
             hint: hint.into(),
-            x: PlotAxis::exactly("Time (s)", 0.0, end_s),
-            y: PlotAxis::exactly("", ends.0, ends.1),
+            x: PlotAxis::new("Time (s)", 0.0, end_s),
+            y: PlotAxis::new("", ends.0, ends.1),
             rules: through.chain(levels).collect(),
             series,
             height: Height::Px(height_px),
