@@ -276,7 +276,7 @@ impl CaseSheet<'_> {
             title: format!("{} under {}: {}", self.subject.category().label(), first.profile, first.verdict().label()),
             subtitle: Some(format!("{synthetic}{}. {}.", self.case(), self.answer())),
             series: series.collect(),
-            until_s: Some(self.shown_until_s()),
+            until_s: None,
             panels,
         }
     }
@@ -327,7 +327,7 @@ impl CaseSheet<'_> {
         let drawn = |panels: TracePanels| PageFigure::new(&self.figure(panels).svg(), &[]);
         let recorded = self.recorded_motion();
         let course = Section::new("course", "Course of the case")
-            .intro([self.cut(), recorded.clone().unwrap_or_default()].join(" "))
+            .intro(recorded.clone().unwrap_or_default())
             .figures([drawn(TracePanels::Course), PageFigure::new(&above.positions().svg(), &[])])
             .figures(recorded.map(|_| drawn(TracePanels::Motion)))
             .parts([Section::new("", "TTC, BTN, fuzzy surrogates and lateral position")

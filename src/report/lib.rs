@@ -4,7 +4,6 @@
 //! `run.json`. It computes nothing beyond formatting. Scores come from [`lanesweep_run::score`]; text and files go to the
 //! user.
 
-mod case_course;
 mod case_evidence;
 pub mod case_identity;
 mod case_sensitivity;

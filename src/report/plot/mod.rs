@@ -16,15 +16,15 @@ pub(super) use layer::{Cells, FilledCell, Mark, Rule, Series, Value};
 pub(super) use look::{Look, Symbol};
 
 pub(super) use axis::plain_end;
-use layer::{HOLLOW, fill_sample};
-pub(super) use layer::{TICK, is_few};
-pub(super) use svg::{Anchor, Canvas, GREY, INK, Type, set};
+pub(super) use layer::is_few;
+use layer::{HOLLOW, TICK, fill_sample};
+pub(super) use svg::{GREY, INK};
 
 use axis::{Axes, Axis, on_circle};
 use frame::{numbers_left, spoke_name};
 use lanesweep_support::readable::plain;
 use lanesweep_support::table::Table;
-use svg::{GRID, Paint, Position, WHITE};
+use svg::{Anchor, Canvas, GRID, Paint, Position, Type, WHITE, set};
 
 /// Width of a figure: type of 13 px becomes 6 pt at the 252 pt of a paper's column.
 const COLUMN_PX: f64 = 540.0;
@@ -145,7 +145,7 @@ impl Figure {
     /// The figure as a complete SVG document. Texts are XML-escaped; control characters become U+FFFD. The same figure
     /// gives the same bytes. It never fails: a plot without a value says so, and without plots only the texts remain.
     pub fn svg(&self) -> String {
-        self.svg_with(|_, y| y)
+        self.drawn().document(&self.title, &self.description())
     }
 
     /// The figure for a paper, as wide as a column (88 mm) or two (180 mm), and its texts, which are not in it.
@@ -168,7 +168,7 @@ impl Figure {
             texts.push(self.notes.0.to_owned());
             texts.extend(self.notes.1.iter().cloned());
         }
-        let svg = bare.drawn(|_, y| y).in_mm(width_mm).document(&self.title, &self.description());
+        let svg = bare.drawn().in_mm(width_mm).document(&self.title, &self.description());
         (svg, texts.join("\n") + "\n")
     }
 
@@ -181,20 +181,14 @@ impl Figure {
         self.series().flat_map(|series| &series.values).any(|value| value.is_few)
     }
 
-    /// The same with what `between` draws below the heading, from a y to the y that it returns.
-    pub(super) fn svg_with(&self, between: impl FnOnce(&mut Canvas, f64) -> f64) -> String {
-        self.drawn(between).document(&self.title, &self.description())
-    }
-
-    fn drawn(&self, between: impl FnOnce(&mut Canvas, f64) -> f64) -> Canvas {
+    fn drawn(&self) -> Canvas {
         let width_px = self.width_px();
         let mut canvas = Canvas::new(width_px + 2.0 * MARGIN_PX);
         let mut y = canvas.paragraph((MARGIN_PX, 14.0), &self.title, TITLE, width_px);
         if let Some(subtitle) = &self.subtitle {
             y = canvas.paragraph((MARGIN_PX, y + 3.0), subtitle, TEXT, width_px);
         }
-        y = between(&mut canvas, y + 8.0);
-        y = self.rows(&mut canvas, y);
+        y = self.rows(&mut canvas, y + 8.0);
         y = self.legend(&mut canvas, y + 2.0);
         let caption = if self.has_few() && !self.caption.is_empty() {
             [&self.caption, HOLLOW].join(" ")

@@ -3,6 +3,7 @@
 use super::super::plot::{GREY, Height, INK, Look, Mark, Plot, PlotAxis, Rule, Series, Symbol, Value, plain_end};
 use super::thousandths;
 use lanesweep_engine::{StepMark, Trace, TracedStep, TracedVehicle};
+use lanesweep_model::scenario::{GAP_ERROR_M, KMH};
 
 /// One lane on the sheet.
 #[derive(Debug, Clone)]
@@ -13,8 +14,12 @@ pub struct TraceSeries<'a> {
     pub trace: &'a Trace,
 }
 
-/// Time shown after the last change, s.
+/// Time shown after the last decisive event, s.
 const REST_S: f64 = 2.0;
+/// A value this near to its worst counts as the worst, relative: near a steady state the last digits take a minute.
+const NEAR: f64 = 0.05;
+/// Smaller changes of an ego's speed decide nothing, m/s.
+const SPEED_CHANGE_MPS: f64 = 1.0 / KMH;
 /// TTC and BTN are shown up to these multiples of their thresholds.
 const TTC_SHOWN: f64 = 10.0;
 const BTN_SHOWN: f64 = 2.5;
@@ -36,7 +41,7 @@ impl From<Curve> for Series {
 }
 
 /// A mark in the colour of its series; shapes distinguish marks.
-pub(super) fn mark_look(mark: StepMark, look: &Look) -> Look {
+fn mark_look(mark: StepMark, look: &Look) -> Look {
     let symbol = match mark {
         StepMark::Reaction => Symbol::Ring,
         StepMark::Braking => Symbol::Polygon(3, 0.5),
@@ -46,7 +51,7 @@ pub(super) fn mark_look(mark: StepMark, look: &Look) -> Look {
 }
 
 /// Dashes of the line through all panels at a mark.
-pub(super) fn mark_dash(mark: StepMark) -> &'static str {
+fn mark_dash(mark: StepMark) -> &'static str {
     match mark {
         StepMark::Reaction => "2,3",
         StepMark::Braking => "7,3",
@@ -92,10 +97,10 @@ pub(super) struct Shown<'a> {
 }
 
 impl<'a> Shown<'a> {
-    /// Up to a given time, or to the last change: lanes may continue long after their last event.
+    /// Up to a given time, or to the last event that decides: lanes may continue long after it.
     pub(super) fn of(series: &'a [TraceSeries<'a>], until_s: Option<f64>) -> Self {
         let end_s = series.iter().filter_map(|s| Some(s.trace.steps.last()?.time_s)).fold(0.0, f64::max);
-        let last_s = series.iter().map(|s| s.trace.last_change_s()).fold(0.0, f64::max) + REST_S;
+        let last_s = series.iter().map(|s| decisive_s(s.trace)).fold(0.0, f64::max) + REST_S;
         let until_s = until_s.unwrap_or(if last_s < 0.8 * end_s { last_s } else { end_s });
         let looks = (0..series.len()).map(|k| Look::of(k, series.len())).collect();
         Shown { series, looks, until_s: until_s.clamp(0.0, end_s) }
@@ -361,6 +366,31 @@ impl<'a> Shown<'a> {
         }
         marks
     }
+}
+
+/// The last time at which a driver decides or is decided, s: marks, changes of its speed, and where gap, TTC and BTN come
+/// near their worst. A TTC or BTN that is never shown decides nothing.
+fn decisive_s(trace: &Trace) -> f64 {
+    let marks = StepMark::ALL.into_iter().filter_map(|mark| trace.step_of(mark)).map(|step| trace.time_s(step));
+    let last_mps = trace.steps.last().map_or(0.0, |step| step.v_ego_mps);
+    let changes = |step: &&TracedStep| (step.v_ego_mps - last_mps).abs() > SPEED_CHANGE_MPS;
+    let braked = trace.steps.iter().rfind(changes).map(|step| step.time_s);
+    let smallest = |step: &TracedStep, of: fn(&TracedVehicle) -> f64| {
+        let judged = step.others[..trace.vehicles].iter().filter(|other| other.is_judged);
+        judged.map(of).fold(f64::INFINITY, f64::min)
+    };
+    // The first time at which a value is as near to its worst as this; none if the worst is above a limit.
+    let first = |of: fn(&TracedVehicle) -> f64, limit: f64, near: &dyn Fn(f64) -> f64| {
+        let worst = trace.steps.iter().map(|step| smallest(step, of)).fold(f64::INFINITY, f64::min);
+        let is_near = |step: &&TracedStep| worst.is_finite() && worst <= limit && smallest(step, of) <= near(worst);
+        trace.steps.iter().find(is_near).map(|step| step.time_s)
+    };
+    let worst = [
+        first(|other| other.gap_m, f64::MAX, &|worst| worst + GAP_ERROR_M.max(worst * NEAR)),
+        first(|other| other.ttc_s, TTC_SHOWN * trace.ttc_threshold_s, &|worst| worst * (1.0 + NEAR)),
+        first(|other| -other.btn, -trace.btn_threshold / TTC_SHOWN, &|worst| worst * (1.0 - NEAR)),
+    ];
+    marks.chain(braked).chain(worst.into_iter().flatten()).fold(0.0, f64::max)
 }
 
 /// A value of another vehicle while it is present, as a thin curve or not.
