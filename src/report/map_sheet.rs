@@ -108,7 +108,7 @@ impl MapSheet<'_> {
         }
         let at = |(i, j): (usize, usize)| (across[i], up[j]);
         let lines = boundary(self.grid, &kind).into_iter().map(|(a, b)| vec![at(a), at(b)]);
-        let attributes = "class=\"boundary\" stroke-linecap=\"square\"".to_owned();
+        let attributes = "class=\"boundary\" stroke-linecap=\"square\"";
         let rule = Rule { runs: lines.collect(), colour: INK, width_px: 1.2, attributes, ..Rule::default() };
         let not_preventable = self.not_preventable.iter().filter(|cells| cells.contains(&true)).map(|cells| {
             let kind = |i: usize, j: usize| usize::from(cells[self.grid.cell(panel, i, j)]);
@@ -121,7 +121,7 @@ impl MapSheet<'_> {
                 colour: BOUNDARY,
                 width_px: 1.8,
                 dash: "5 3",
-                attributes: "class=\"not-preventable\"".to_owned(),
+                attributes: "class=\"not-preventable\"",
                 ..Rule::default()
             }
         });

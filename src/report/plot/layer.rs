@@ -68,8 +68,6 @@ pub struct Series {
     pub values: Vec<Value>,
     /// Own look; `None`: the look of its index in the legend.
     pub look: Option<Look>,
-    /// SVG attributes of each value's group; empty: `class="value"`.
-    pub attributes: String,
 }
 
 /// Reference lines behind the series.
@@ -88,7 +86,7 @@ pub struct Rule {
     /// Lengths of dashes and gaps, px; empty: solid.
     pub dash: &'static str,
     /// Attributes of the lines' group.
-    pub attributes: String,
+    pub attributes: &'static str,
 }
 
 impl Rule {
@@ -96,7 +94,7 @@ impl Rule {
         let runs: Vec<Vec<Position>> =
             self.runs.iter().map(|run| run.iter().map(|value| axes.at(*value)).collect()).collect();
         let paint = Paint { dash: self.dash, ..Paint::line(self.colour, self.width_px) };
-        canvas.group(&self.attributes, "", |canvas| canvas.path(&runs, false, paint));
+        canvas.group(self.attributes, "", |canvas| canvas.path(&runs, false, paint));
     }
 
     /// Draws the label on the end of the first line: before the end of a level one, beside the end of a steep one.
@@ -193,11 +191,7 @@ impl Series {
     pub(super) fn markers(&self, canvas: &mut Canvas, axes: &Axes, look: &Look, tip: &dyn Fn(&Value) -> String) {
         for value in self.values.iter().filter(|value| self.has(Mark::Points) && value.is_shown()) {
             let place = axes.at((value.x, value.y));
-            let (attributes, tip) = match self.attributes.as_str() {
-                "" => ("class=\"value\"", tip(value)),
-                own => (own, String::new()),
-            };
-            canvas.group(attributes, &tip, |canvas| {
+            canvas.group("class=\"value\"", &tip(value), |canvas| {
                 if let Some((low, high)) = self.ends_of(value) {
                     let bar = |(x, y): Position| vec![(x, y - 4.0), (x, y + 4.0)];
                     let (lower, upper) = (axes.at((low, value.y)), axes.at((high, value.y)));

@@ -1,6 +1,6 @@
 //! Lanes step by step, as `simulate` shows them: figure, table, document and summaries.
 
-use super::{TraceFigure, TracePanels, TraceSeries, table};
+use super::{TraceFigure, TraceSeries, table};
 use crate::lanes::{outcome_record, with_outcomes};
 use crate::records::{self, PROGRAM, record};
 use lanesweep_engine::{EndReason, NO_STEP, Outcome, Trace};
@@ -40,7 +40,7 @@ impl TraceReport<'_> {
         let series =
             self.0.lanes.iter().map(|lane| TraceSeries { name: lane.name.clone(), trace: &lane.trace }).collect();
         let subtitle = Some(format!("{synthetic}{}", self.0.origin));
-        TraceFigure { title, subtitle, series, until_s, panels: TracePanels::All }
+        TraceFigure { title, subtitle, series, until_s }
     }
 
     /// Every step as CSV.

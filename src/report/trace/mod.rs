@@ -13,7 +13,7 @@ use lanesweep_engine::{StepMark, Trace, TracedStep};
 use lanesweep_support::readable::plain;
 use lanesweep_support::table::Table;
 use panels::Shown;
-pub use panels::{TracePanels, TraceSeries};
+pub use panels::TraceSeries;
 
 /// Lanes of one case, or of variants of a case, on one sheet.
 #[derive(Debug, Clone)]
@@ -26,8 +26,6 @@ pub struct TraceFigure<'a> {
     pub series: Vec<TraceSeries<'a>>,
     /// Last time shown, s; `None`: 2 s after the last change.
     pub until_s: Option<f64>,
-    /// The panels.
-    pub panels: TracePanels,
 }
 
 impl TraceFigure<'_> {
@@ -47,7 +45,7 @@ impl TraceFigure<'_> {
             return Figure { title, subtitle, caption, ..Figure::default() }.svg();
         }
         let shown = Shown::of(&self.series, self.until_s);
-        let (columns, mut plots) = shown.panels(self.panels);
+        let (columns, mut plots) = shown.panels();
         let caption = self.notes(&shown, &plots).join(" ");
         plots.iter_mut().take(1).for_each(|plot| plot.rules.extend(self.legend(&shown.looks)));
         Figure { title, subtitle, plots, columns, is_wide: columns > 1, caption, ..Figure::default() }.svg()
@@ -57,8 +55,8 @@ impl TraceFigure<'_> {
     fn legend(&self, looks: &[Look]) -> impl Iterator<Item = Rule> {
         self.series.iter().zip(looks).map(|(TraceSeries { name, trace }, look)| {
             let mark = |mark: StepMark| match trace.step_of(mark) {
-                Some(step) => format!("{} {} s", mark.label(), thousandths(trace.time_s(step))),
-                None => format!("{} never", mark.label()),
+                Some(step) => format!("{}\u{a0}{}\u{a0}s", mark.label(), thousandths(trace.time_s(step))),
+                None => format!("{}\u{a0}never", mark.label()),
             };
             let ttc = trace.outcome.approach_ttc().map_or("–".to_owned(), |ttc_s| format!("{} s", plain(ttc_s, 3)));
             let marks = StepMark::ALL.map(mark).join(", ");
@@ -86,11 +84,9 @@ impl TraceFigure<'_> {
         let is_cut =
             |plot: &Plot| plot.series.iter().flat_map(|series| &series.values).any(|value| value.y >= plot.y.ends.1);
         if plots.iter().any(is_cut) {
-            notes.push("A curve that ends at the top edge goes on above it.".to_owned());
+            notes.push("A curve along the top edge is above it.".to_owned());
         }
-        if self.panels != TracePanels::Course {
-            notes.push(format!("Long dashes: edges of a lane {} m wide.", thousandths(self.lane_width_m())));
-        }
+        notes.push(format!("Long dashes: edges of a lane {} m wide.", thousandths(self.lane_width_m())));
         let end_s = self.series.iter().filter_map(|s| Some(s.trace.steps.last()?.time_s)).fold(0.0, f64::max);
         if end_s > shown.until_s {
             let (until, end) = (thousandths(shown.until_s), thousandths(end_s));
