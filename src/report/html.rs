@@ -39,21 +39,16 @@ impl PageFigure {
     /// figures/NAME.txt.
     pub(super) fn add(results: &mut Results, name: &str, figure: &Figure, is_plain: bool) -> Result<PageFigure> {
         let [numbers, file] = [format!("{TABLES}{name}.csv"), format!("{FIGURES}{name}.svg")];
+        let svg = figure.svg();
         results.add_table(&numbers, figure.numbers())?;
-        if !is_plain {
-            return PageFigure::add_svg(results, name, &figure.svg(), &numbers);
+        if is_plain {
+            let (plain, texts) = figure.plain();
+            results.add(&file, plain.as_bytes())?;
+            results.add(&format!("{FIGURES}{name}.txt"), texts.as_bytes())?;
+        } else {
+            results.add(&file, svg.as_bytes())?;
         }
-        let (plain, texts) = figure.plain();
-        results.add(&file, plain.as_bytes())?;
-        results.add(&format!("{FIGURES}{name}.txt"), texts.as_bytes())?;
-        Ok(PageFigure::new(&figure.svg(), &[&file, &numbers]))
-    }
-
-    /// Adds a complete SVG document to the results as figures/NAME.svg; its values are in another of their files.
-    pub(super) fn add_svg(results: &mut Results, name: &str, svg: &str, numbers: &str) -> Result<PageFigure> {
-        let file = format!("{FIGURES}{name}.svg");
-        results.add(&file, svg.as_bytes())?;
-        Ok(PageFigure::new(svg, &[&file, numbers]))
+        Ok(PageFigure::new(&svg, &[&file, &numbers]))
     }
 }
 

@@ -10,10 +10,6 @@ use lanesweep_run::grid::{CellOutcome, Grid, boundary, runs};
 
 /// A sheet.
 pub(super) struct MapSheet<'a> {
-    /// Heading; wrapped when long.
-    pub title: String,
-    /// Line below the heading; wrapped when long.
-    pub subtitle: String,
     /// The grid.
     pub grid: &'a Grid,
     /// Outcomes that tables and legends count.
@@ -22,8 +18,6 @@ pub(super) struct MapSheet<'a> {
     pub cells: Vec<CellOutcome>,
     /// Per cell: whether it is not preventable. Its boundary is drawn if known.
     pub not_preventable: Option<Vec<bool>>,
-    /// Notes at the foot.
-    pub notes: Vec<String>,
 }
 
 /// Colour of the boundary of cases that are not preventable.
@@ -45,23 +39,21 @@ pub(super) fn colour(outcome: CellOutcome) -> &'static str {
 }
 
 impl MapSheet<'_> {
-    /// The sheet as a figure.
-    pub(super) fn figure(&self) -> Figure {
+    /// The sheet as a figure with these notes at its foot.
+    pub(super) fn figure(&self, title: String, subtitle: String, notes: Vec<String>) -> Figure {
         let (columns, plots) = self.trellis();
+        let none = match &self.not_preventable {
+            Some(cells) if !cells.contains(&true) => " In no cell do CCHDM and FSM both collide.",
+            _ => "",
+        };
         Figure {
-            title: self.title.clone(),
-            subtitle: Some(self.subtitle.clone()),
+            title,
+            subtitle: Some(subtitle),
             plots,
             columns,
             is_wide: columns > MAX_NARROW,
-            caption: match &self.not_preventable {
-                Some(cells) if !cells.contains(&true) => {
-                    "Black lines: the boundary, between cells of different kinds. In no cell do CCHDM and FSM both collide."
-                }
-                _ => "Black lines: the boundary, between cells of different kinds.",
-            }
-            .to_owned(),
-            notes: ("Notes:", self.notes.clone()),
+            caption: format!("Black lines: the boundary, between cells of different kinds.{none}"),
+            notes: ("Notes:", notes),
         }
     }
 

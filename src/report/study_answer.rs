@@ -178,18 +178,16 @@ impl StudyReport<'_> {
         let widths: [usize; 7] = std::array::from_fn(width);
         // The category has a line of its own.
         let line = |row: &[String; 7]| {
-            let (mut line, mut end) = (String::new(), 0);
-            for (at, cell) in row.iter().enumerate().skip(1) {
-                end += widths[at] + if at > 1 { 2 } else { 0 };
-                let start = end - if NUMBERS.contains(&at) { cell.chars().count() } else { widths[at] };
+            let cell = |at: usize, width: usize| match NUMBERS.contains(&at) {
+                true => format!("{:>width$}", row[at]),
+                false => format!("{:<width$}", row[at]),
+            };
+            let cells = match is_sentence(row, SCORE) {
                 // A sentence in place of an answer extends over the empty columns after it.
-                let gap = start.saturating_sub(line.chars().count()).max(if at > 1 { 2 } else { 0 });
-                if !cell.is_empty() {
-                    line += &" ".repeat(gap);
-                    line += cell;
-                }
-            }
-            line
+                true => vec![cell(1, widths[1]), cell(2, widths[2]), cell(3, widths[3..6].iter().sum::<usize>() + 4)],
+                false => (1..6).map(|at| cell(at, widths[at])).collect(),
+            };
+            format!("{}  {}", cells.join("  "), cell(6, widths[6])).trim_end().to_owned()
         };
         let mut lines = vec![line(&header)];
         for of in shown.chunk_by(|a, b| a.category == b.category) {
