@@ -13,6 +13,7 @@ use super::concrete::{Concrete, EgoMotion, PlayedVehicle, Vertex, number};
 use super::road::road_file;
 use crate::records::PROGRAM;
 use lanesweep_support::Result;
+use lanesweep_support::plain_text::escape_markup;
 use lanesweep_support::run_folder::RunFolder;
 use lanesweep_support::table::Table;
 
@@ -113,25 +114,10 @@ fn position(scenario: &Concrete, vehicle: &PlayedVehicle, centre: &Vertex) -> St
     format!("<Position><WorldPosition x=\"{x_m}\" y=\"{y_m}\" z=\"0\" h=\"0\"/></Position>")
 }
 
-/// A text as the value of an attribute, valid for XML 1.0 and for OpenSCENARIO, where a leading `$` is a parameter.
+/// A text as the value of an attribute. A leading `$` would be a parameter.
 fn escaped(text: &str) -> String {
-    let mut value = String::new();
-    if text.starts_with('$') {
-        value.push(' ');
-    }
-    for c in text.chars() {
-        match c {
-            '<' => value += "&lt;",
-            '>' => value += "&gt;",
-            '&' => value += "&amp;",
-            '\'' => value += "&apos;",
-            '"' => value += "&quot;",
-            '\t' | '\n' | '\r' => value += &format!("&#{};", u32::from(c)),
-            '\0'..' ' | '\u{fffe}' | '\u{ffff}' => value.push('\u{fffd}'),
-            c => value.push(c),
-        }
-    }
-    value
+    let blank = if text.starts_with('$') { " " } else { "" };
+    format!("{blank}{}", escape_markup(text).replace('\n', "&#10;"))
 }
 
 /// A valid identifier: letters, digits and `_`, not starting with a digit.

@@ -11,6 +11,7 @@ mod look;
 mod svg;
 
 use std::f64::consts::TAU;
+use std::iter;
 
 pub(super) use layer::{Cells, FilledCell, Mark, Rule, Series, Value};
 pub(super) use look::{Look, Symbol};
@@ -145,65 +146,43 @@ impl Figure {
     /// The figure as a complete SVG document. Texts are XML-escaped; control characters become U+FFFD. The same figure
     /// gives the same bytes. It never fails: a plot without a value says so, and without plots only the texts remain.
     pub fn svg(&self) -> String {
-        self.drawn().document(&self.title, &self.description())
+        self.drawn(&self.texts(), None)
     }
 
     /// The figure for a paper, as wide as a column (88 mm) or two (180 mm), and its texts, which are not in it.
     pub(super) fn plain(&self) -> (String, String) {
-        let bare = Figure {
-            title: String::new(),
-            subtitle: None,
-            caption: String::new(),
-            notes: ("", Vec::new()),
-            ..self.clone()
-        };
         let width_mm = if self.is_wide { 180.0 } else { 88.0 };
-        let mut texts = vec![self.title.clone()];
-        texts.extend(self.subtitle.clone());
-        texts.push(self.caption.clone());
-        if self.has_few() {
-            texts.push(HOLLOW.to_owned());
-        }
-        if !self.notes.1.is_empty() {
-            texts.push(self.notes.0.to_owned());
-            texts.extend(self.notes.1.iter().cloned());
-        }
-        let svg = bare.drawn().in_mm(width_mm).document(&self.title, &self.description());
-        (svg, texts.join("\n") + "\n")
+        let texts = self.texts().concat().into_iter().map(|(.., words)| words + "\n").collect();
+        (self.drawn(&[Vec::new(), Vec::new()], Some(width_mm)), texts)
     }
 
-    /// What a screen reader says: the data, and what the marks are.
-    fn description(&self) -> String {
-        [self.subtitle.as_deref().unwrap_or_default(), &self.caption].join(" ").trim().to_owned()
+    /// The texts above and below the plots, with their type and the space above them.
+    fn texts(&self) -> [Vec<(Type, f64, String)>; 2] {
+        let has_few = self.series().flat_map(|series| &series.values).any(|value| value.is_few);
+        let caption = [&*self.caption, if has_few { HOLLOW } else { "" }].join(" ").trim_end().to_owned();
+        let (heading, lines) = &self.notes;
+        let heading = lines.first().map(|_| (HEADING, 5.0, (*heading).to_owned()));
+        let notes = heading.into_iter().chain(lines.iter().map(|line| (TEXT, 2.0, line.clone())));
+        let subtitle = self.subtitle.iter().map(|subtitle| (TEXT, 3.0, subtitle.clone()));
+        let title = (TITLE, 0.0, self.title.clone());
+        [iter::once(title).chain(subtitle).collect(), iter::once((TEXT, 3.0, caption)).chain(notes).collect()]
     }
 
-    fn has_few(&self) -> bool {
-        self.series().flat_map(|series| &series.values).any(|value| value.is_few)
-    }
-
-    fn drawn(&self) -> Canvas {
+    fn drawn(&self, [above, below]: &[Vec<(Type, f64, String)>; 2], width_mm: Option<f64>) -> String {
         let width_px = self.width_px();
         let mut canvas = Canvas::new(width_px + 2.0 * MARGIN_PX);
-        let mut y = canvas.paragraph((MARGIN_PX, 14.0), &self.title, TITLE, width_px);
-        if let Some(subtitle) = &self.subtitle {
-            y = canvas.paragraph((MARGIN_PX, y + 3.0), subtitle, TEXT, width_px);
+        let mut y = 14.0;
+        for (set, gap_px, words) in above {
+            y = canvas.paragraph((MARGIN_PX, y + gap_px), words, *set, width_px);
         }
         y = self.rows(&mut canvas, y + 8.0);
         y = self.legend(&mut canvas, y + 2.0);
-        let caption = if self.has_few() && !self.caption.is_empty() {
-            [&self.caption, HOLLOW].join(" ")
-        } else {
-            self.caption.clone()
-        };
-        y = canvas.paragraph((MARGIN_PX, y + 3.0), &caption, TEXT, width_px);
-        if !self.notes.1.is_empty() {
-            y = canvas.paragraph((MARGIN_PX, y + 5.0), self.notes.0, HEADING, width_px);
+        for (set, gap_px, words) in below {
+            y = canvas.paragraph((MARGIN_PX, y + gap_px), words, *set, width_px);
         }
-        for line in &self.notes.1 {
-            y = canvas.paragraph((MARGIN_PX, y + 2.0), line, TEXT, width_px);
-        }
-        canvas.end_at(y);
-        canvas
+        // What a screen reader says: the data, and what the marks are.
+        let description = [self.subtitle.as_deref().unwrap_or_default(), &self.caption].join(" ");
+        canvas.document(y, width_mm, &self.title, description.trim())
     }
 
     /// The numbers of the series: one row per value.
