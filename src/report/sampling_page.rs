@@ -18,7 +18,8 @@ impl SampleReport<'_> {
         if !self.is_reproducible() {
             warnings.push("Ended by the clock: another machine ends elsewhere.".to_owned());
         }
-        let clock = (self.host.seconds > 0.0).then(|| self.host.wall_clock());
+        let clock = (self.host.seconds > 0.0)
+            .then(|| ("seconds", format!("{:.2} on {} threads", self.host.seconds, self.host.threads)));
         let reproduction =
             self.host.section(&self.sample.profile).fact("SHA-256 of the density", density.content_sha256()?);
         let sections = vec![self.estimates_section(), reproduction.host(clock).folded()];
