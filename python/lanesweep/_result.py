@@ -78,7 +78,7 @@ class Figure:
                 # Rows with a name have their place on the other axis.
                 x = [record["x"] for record in series]
                 y = [-names.index(record["row"]) if np.isnan(record["y"]) else record["y"] for record in series]
-                axis.errorbar(x, y, _bars(series, "y", y), _bars(series, "x", x), fmt="o" if names else "o-", markersize=4, label=name)
+                axis.errorbar(x, y, xerr=_bars(series, x), fmt="o" if names else "o-", markersize=4, label=name)
             if names and np.isnan(own[0]["y"]):
                 axis.set_yticks([-at for at in range(len(names))], names)
             axis.set(title=panel, xlabel=own[0]["x_quantity"], ylabel=own[0]["y_quantity"])
@@ -96,9 +96,9 @@ class Figure:
         return f"Figure({self.path.name!r})"
 
 
-def _bars(rows: list[dict[str, Any]], axis: str, at: list[float]) -> Any:
+def _bars(rows: list[dict[str, Any]], at: list[float]) -> Any:
     """Distances to the ends of intervals, as Matplotlib takes them; none without any."""
-    ends = np.array([[row[f"{axis}_{end}"] for row in rows] for end in ("low", "high")])
+    ends = np.array([[row[f"x_{end}"] for row in rows] for end in ("low", "high")])
     return None if np.isnan(ends[0]).all() else np.abs(np.where(np.isnan(ends), at, ends) - np.array(at))
 
 

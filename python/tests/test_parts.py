@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from lanesweep import parts
 
-FILES = ["estimates.csv", "tables/convergence.csv", "figures/convergence.svg"]
+FILES = ["estimates.csv", "tables/convergence.csv"]
 
 
 def contents(result: lanesweep.Result, names: list[str]) -> dict[str, bytes]:

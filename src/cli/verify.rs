@@ -62,7 +62,7 @@ impl Verify {
                 .with_bar(plan.lane_count(), name, |bar| compare(name, &plan, tested, |lanes| bar.inc(lanes)))?;
             // Print set by set, so that a later failure of the device keeps earlier results.
             if is_text {
-                console::print(&format!("\n{}", verification::comparison(&comparison)))?;
+                console::print(&format!("\n{}", verification::comparison(&comparison, profile.frame.dt_s)))?;
             }
             sets.push(verification::record(&comparison, profile.frame.dt_s));
             equal &= comparison.is_equal();

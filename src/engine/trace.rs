@@ -207,27 +207,6 @@ impl Trace {
         }
     }
 
-    /// The last time at which anything except positions changes or the worst value occurs, s.
-    pub fn last_change_s(&self) -> f64 {
-        let state = |step: &TracedStep| {
-            let of = |other: &TracedVehicle| (other.v_mps, other.y_m, other.is_present, other.is_judged);
-            (step.v_ego_mps, step.is_unsafe, step.others.each_ref().map(of))
-        };
-        let mut changes =
-            self.steps.windows(2).filter(|pair| state(&pair[0]) != state(&pair[1])).map(|pair| pair[1].time_s);
-        let worst = |value: &dyn Fn(&TracedVehicle) -> f64| {
-            let of = |step: &TracedStep| {
-                let judged = step.others[..self.vehicles].iter().filter(|other| other.is_judged);
-                judged.map(value).fold(f64::INFINITY, f64::min)
-            };
-            let worst = self.steps.iter().min_by(|a, b| of(a).total_cmp(&of(b)))?;
-            of(worst).is_finite().then_some(worst.time_s)
-        };
-        let worst = [worst(&|other| other.ttc_s), worst(&|other| -other.btn)];
-        let marks = StepMark::ALL.map(|mark| self.step_of(mark).map(|step| self.time_s(step)));
-        changes.next_back().into_iter().chain(worst.into_iter().chain(marks).flatten()).fold(0.0, f64::max)
-    }
-
     /// Time of a step, s, without the rounding error of the product.
     pub fn time_s(&self, step: u32) -> f64 {
         time_s(step, self.dt_s)

@@ -160,6 +160,18 @@ impl CaseSheet<'_> {
         self.demand_of_first().into_iter().chain(of_others).chain(self.clause_of_leaders()).collect()
     }
 
+    /// What the recorded motion shows, in a sentence; `None` for a case of plain numbers.
+    pub(super) fn recorded_motion(&self) -> Option<String> {
+        let Subject::Recorded(scenario, _) = self.subject else { return None };
+        let end_s = scenario.target.v.len().saturating_sub(1) as f64 / scenario.fps;
+        Some(format!(
+            "The other vehicles move as recorded, at {} samples per second until {} s; after that they keep speed and \
+             lateral position.",
+            value(scenario.fps),
+            value(end_s)
+        ))
+    }
+
     /// The clause of a leader that brakes, which names no driver.
     fn clause_of_leaders(&self) -> Option<String> {
         let brakes = match self.subject {

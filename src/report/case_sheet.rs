@@ -11,7 +11,7 @@ use super::html::{Page, PageFigure, Section};
 use super::lanes::{outcome_record, with_outcomes};
 use super::records::{self, PROGRAM, record};
 use super::tables::{WIDTH, wrap};
-use super::trace::{TraceFigure, TracePanels, TraceSeries};
+use super::trace::{TraceFigure, TraceSeries};
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::profile::Profile;
 use lanesweep_model::scenario::{CaseQuantity, KMH, NUMBERS};
@@ -265,7 +265,7 @@ impl CaseSheet<'_> {
     }
 
     /// The figure of the case under the first profile, step by step, with the answer.
-    fn figure(&self, panels: TracePanels) -> TraceFigure<'_> {
+    fn figure(&self) -> TraceFigure<'_> {
         let first = self.first();
         let series = first
             .models
@@ -276,8 +276,7 @@ impl CaseSheet<'_> {
             title: format!("{} under {}: {}", self.subject.category().label(), first.profile, first.verdict().label()),
             subtitle: Some(format!("{synthetic}{}. {}.", self.case(), self.answer())),
             series: series.collect(),
-            until_s: Some(self.shown_until_s()),
-            panels,
+            until_s: None,
         }
     }
 
@@ -323,15 +322,10 @@ impl CaseSheet<'_> {
         let boundaries = Section::new("boundary", "Distance to another answer")
             .intro(format!("{BOUNDARIES}."))
             .tables([self.boundaries().captioned("Distance to the boundary")]);
-        let above = TraceFigure { subtitle: None, ..self.figure(TracePanels::Course) };
-        let drawn = |panels: TracePanels| PageFigure::new(&self.figure(panels).svg(), &[]);
-        let recorded = self.recorded_motion();
+        let above = TraceFigure { subtitle: None, ..self.figure() };
         let course = Section::new("course", "Course of the case")
-            .intro([self.cut(), recorded.clone().unwrap_or_default()].join(" "))
-            .figures([drawn(TracePanels::Course), PageFigure::new(&above.positions().svg(), &[])])
-            .figures(recorded.map(|_| drawn(TracePanels::Motion)))
-            .parts([Section::new("", "TTC, BTN, fuzzy surrogates and lateral position")
-                .figures([drawn(TracePanels::Measures)])]);
+            .intro(self.recorded_motion().unwrap_or_default())
+            .figures([self.figure().svg(), above.positions().svg()].map(|svg| PageFigure::new(&svg, &[])));
         // The profile's constants are a table for people; this is a copy for programs.
         let assumptions = self
             .assumptions_section()

@@ -1,6 +1,6 @@
 //! Dot plots: estimates with their intervals, a row of close lines per name, a line per series.
 
-use super::plot::{Ends, GREY, Height, Look, Mark, Name, Plot, PlotAxis, Rule, Series, Value, name_height_px};
+use super::plot::{GREY, Height, Look, Mark, Name, Plot, PlotAxis, Rule, Series, Value, name_height_px};
 
 /// Height of a line, and of the space below a row, px.
 const LINE_PX: f64 = 8.0;
@@ -29,7 +29,6 @@ pub(super) fn dots(rows: &[(String, String)], x: PlotAxis, series: Vec<Series>) 
             values: series.values.into_iter().map(value).collect(),
             marks: vec![Mark::Points, Mark::Intervals],
             look: Some(Look { line_px: 1.4, marker_px: 3.8, ..look }),
-            is_sideways: true,
             ..series
         }
     };
@@ -39,10 +38,9 @@ pub(super) fn dots(rows: &[(String, String)], x: PlotAxis, series: Vec<Series>) 
         width_px: 0.5,
         ..Rule::default()
     };
-    let ends = Ends::Exactly(-height_px, 0.0);
     Plot {
         x,
-        y: PlotAxis { names: rows.iter().enumerate().map(name).collect(), ends, ..PlotAxis::default() },
+        y: PlotAxis { names: rows.iter().enumerate().map(name).collect(), ..PlotAxis::new("", -height_px, 0.0) },
         rules: vec![separators],
         series: series.into_iter().enumerate().map(line).collect(),
         height: Height::Px(height_px),

@@ -77,16 +77,6 @@ impl Host {
             .parts([Section::options("Profile", profile)])
     }
 
-    /// What computed, for a page.
-    pub(super) fn computed_by(&self) -> (&'static str, String) {
-        ("computed by", self.backend.clone())
-    }
-
-    /// The time that it took, for a page.
-    pub(super) fn wall_clock(&self) -> (&'static str, String) {
-        ("seconds", format!("{:.2} on {} threads", self.seconds, self.threads))
-    }
-
     /// What computed, whether a device computed as the CPU does, and the options that are not the default.
     pub(super) fn facts(&self) -> Vec<(&'static str, String)> {
         let equal = match &self.device {
@@ -102,7 +92,10 @@ impl Host {
         let set: Vec<String> =
             set.map(|setting| format!("{} = {} ({})", setting.key, setting.value, setting.source)).collect();
         let set = (!set.is_empty()).then(|| ("options that are set", set.join("\n")));
-        [self.computed_by(), ("GPU = CPU", equal), ("checked", again)].into_iter().chain(set).collect()
+        [("computed by", self.backend.clone()), ("GPU = CPU", equal), ("checked", again)]
+            .into_iter()
+            .chain(set)
+            .collect()
     }
 
     /// The commit for records; null if unknown.

@@ -1,8 +1,6 @@
 //! One self-contained page: texts, tables and figures of a run in one file, without external resources. The caller fills
 //! a `Page` with content; `templates` have its style and the one script, which sorts tables and shows values.
 
-use std::fmt;
-
 use base64::prelude::{BASE64_STANDARD, Engine};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
@@ -10,7 +8,7 @@ use sha2::{Digest, Sha256};
 use super::plot::Figure;
 use super::records::PROGRAM;
 use lanesweep_support::Result;
-use lanesweep_support::plain_text::shown;
+use lanesweep_support::plain_text::escape_markup;
 use lanesweep_support::run_folder::{FIGURES, Results, TABLES};
 use lanesweep_support::table::Table;
 
@@ -39,21 +37,16 @@ impl PageFigure {
     /// figures/NAME.txt.
     pub(super) fn add(results: &mut Results, name: &str, figure: &Figure, is_plain: bool) -> Result<PageFigure> {
         let [numbers, file] = [format!("{TABLES}{name}.csv"), format!("{FIGURES}{name}.svg")];
+        let svg = figure.svg();
         results.add_table(&numbers, figure.numbers())?;
-        if !is_plain {
-            return PageFigure::add_svg(results, name, &figure.svg(), &numbers);
+        if is_plain {
+            let (plain, texts) = figure.plain();
+            results.add(&file, plain.as_bytes())?;
+            results.add(&format!("{FIGURES}{name}.txt"), texts.as_bytes())?;
+        } else {
+            results.add(&file, svg.as_bytes())?;
         }
-        let (plain, texts) = figure.plain();
-        results.add(&file, plain.as_bytes())?;
-        results.add(&format!("{FIGURES}{name}.txt"), texts.as_bytes())?;
-        Ok(PageFigure::new(&figure.svg(), &[&file, &numbers]))
-    }
-
-    /// Adds a complete SVG document to the results as figures/NAME.svg; its values are in another of their files.
-    pub(super) fn add_svg(results: &mut Results, name: &str, svg: &str, numbers: &str) -> Result<PageFigure> {
-        let file = format!("{FIGURES}{name}.svg");
-        results.add(&file, svg.as_bytes())?;
-        Ok(PageFigure::new(svg, &[&file, numbers]))
+        Ok(PageFigure::new(&svg, &[&file, &numbers]))
     }
 }
 
@@ -164,27 +157,10 @@ impl Section {
     }
 }
 
-/// A text in a page. In addition to HTML's own, characters that reverse or hide text are made visible.
-struct Escaped<'a>(&'a str);
-
-impl fmt::Display for Escaped<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        shown(self.0).chars().try_for_each(|c| match c {
-            '<' => f.write_str("&lt;"),
-            '>' => f.write_str("&gt;"),
-            '&' => f.write_str("&amp;"),
-            '"' => f.write_str("&quot;"),
-            '\'' => f.write_str("&#x27;"),
-            '/' => f.write_str("&#x2f;"),
-            c => write!(f, "{c}"),
-        })
-    }
-}
-
 impl Page {
     /// The page as a complete HTML document. The same page gives the same bytes.
     pub(super) fn html(&self) -> String {
-        let title = Escaped(&self.title);
+        let title = escape_markup(&self.title);
         let App { markup, style, script, data } = self.app.clone().unwrap_or_default();
         let script = format!("{SCRIPT}{script}");
         let script_sha256 = BASE64_STANDARD.encode(Sha256::digest(&script));
@@ -196,14 +172,14 @@ impl Page {
         let synthetic = "SYNTHETIC DATA: nothing on this page is a statement about real traffic.";
         let warnings = self.synthetic.then_some(synthetic).into_iter().chain(self.warnings.iter().map(String::as_str));
         let warnings: String =
-            warnings.map(|warning| format!("\n<p class=\"warning\">{}</p>", Escaped(warning))).collect();
+            warnings.map(|warning| format!("\n<p class=\"warning\">{}</p>", escape_markup(warning))).collect();
         let sections: String = self
             .sections
             .iter()
             .enumerate()
             .map(|(at, section)| {
                 let contents = if at == 0 { self.contents() } else { String::new() };
-                format!("\n<section id=\"{}\">{}{contents}\n</section>", Escaped(&section.id), section.html())
+                format!("\n<section id=\"{}\">{}{contents}\n</section>", escape_markup(&section.id), section.html())
             })
             .collect();
         format!(
@@ -214,9 +190,9 @@ impl Page {
              <meta name=\"generator\" content=\"{program}\">\n<title>{title}</title>\n<link rel=\"icon\" href=\"data:,\">\n\
              <style>\n{STYLE}\n{style}{footer}\n</style>\n</head>\n<body>\n<header>\n<h1>{title}</h1>\n<p>{lead}</p>{warnings}\n</header>\n\
              <main>{markup}{sections}\n</main>\n<div id=\"tip\" role=\"status\" hidden></div>{data}\n<script>{script}</script>\n</body>\n</html>",
-            program = Escaped(PROGRAM),
+            program = escape_markup(PROGRAM),
             footer = self.footer(),
-            lead = Escaped(&self.lead),
+            lead = escape_markup(&self.lead),
         )
     }
 
@@ -236,7 +212,9 @@ impl Page {
         if others.is_empty() {
             return String::new();
         }
-        let link = |of: &Section| format!("\n<li><a href=\"#{}\">{}</a></li>", Escaped(&of.id), Escaped(&of.title));
+        let link = |of: &Section| {
+            format!("\n<li><a href=\"#{}\">{}</a></li>", escape_markup(&of.id), escape_markup(&of.title))
+        };
         let links: String = others.iter().map(link).collect();
         format!("\n<nav aria-label=\"Contents\">\n<ul>{links}\n</ul>\n</nav>")
     }
@@ -244,7 +222,7 @@ impl Page {
 
 impl Section {
     fn html(&self) -> String {
-        let (title, content) = (Escaped(&self.title), self.content());
+        let (title, content) = (escape_markup(&self.title), self.content());
         match (self.is_folded, self.title.is_empty()) {
             (true, _) => format!("\n<details>\n<summary><h2>{title}</h2></summary>{content}\n</details>"),
             (false, true) => content,
@@ -255,10 +233,10 @@ impl Section {
     fn content(&self) -> String {
         let mut html = String::new();
         if !self.intro.is_empty() {
-            html += &format!("\n<p>{}</p>", Escaped(&self.intro));
+            html += &format!("\n<p>{}</p>", escape_markup(&self.intro));
         }
         if !self.text.is_empty() {
-            html += &format!("\n<pre>{}</pre>", Escaped(&self.text));
+            html += &format!("\n<pre>{}</pre>", escape_markup(&self.text));
         }
         html.extend(self.tables.iter().map(table));
         if !self.figures.is_empty() {
@@ -273,7 +251,7 @@ impl Section {
             html += &format!("\n<dl class=\"host\">\n<!-- host -->{host}\n<!-- end of host -->\n</dl>");
         }
         html.extend(self.parts.iter().map(|part| {
-            let (title, content) = (Escaped(&part.title), part.content());
+            let (title, content) = (escape_markup(&part.title), part.content());
             format!("\n<details class=\"part\">\n<summary>{title}</summary>{content}\n</details>")
         }));
         html
@@ -283,7 +261,8 @@ impl Section {
 impl PageFigure {
     fn html(&self) -> String {
         let class = if self.is_wide { " class=\"wide\"" } else { "" };
-        let files: Vec<String> = self.files.iter().map(|file| format!("<code>{}</code>", Escaped(file))).collect();
+        let files: Vec<String> =
+            self.files.iter().map(|file| format!("<code>{}</code>", escape_markup(file))).collect();
         let caption = match files.is_empty() {
             true => String::new(),
             false => format!("\n<figcaption>Files: {}</figcaption>", files.join(", ")),
@@ -296,21 +275,21 @@ fn table(table: &Table) -> String {
     let (header, rows) = table.shown();
     let class = |at: usize| if at < table.words() { " class=\"text\"" } else { "" };
     let cells = |tag: &str, end: &str, row: &[String]| -> String {
-        let cell = |(at, cell): (usize, &String)| format!("<{tag}{}>{}</{end}>", class(at), Escaped(cell));
+        let cell = |(at, cell): (usize, &String)| format!("<{tag}{}>{}</{end}>", class(at), escape_markup(cell));
         row.iter().enumerate().map(cell).collect()
     };
     let body: String = rows.iter().map(|row| format!("\n<tr>{}</tr>", cells("td", "td", row))).collect();
     format!(
         "\n<div class=\"scroll\">\n<table>\n<caption>{}</caption>\n<thead><tr>{}</tr></thead>\n<tbody>{body}\n</tbody>\n\
          </table>\n</div>",
-        Escaped(&table.caption),
+        escape_markup(&table.caption),
         cells("th scope=\"col\"", "th", &header),
     )
 }
 
 fn facts(facts: &[(String, String)]) -> String {
     let fact = |(name, value): &(String, String)| {
-        format!("\n<div><dt>{}</dt><dd>{}</dd></div>", Escaped(name), Escaped(value))
+        format!("\n<div><dt>{}</dt><dd>{}</dd></div>", escape_markup(name), escape_markup(value))
     };
     facts.iter().map(fact).collect()
 }

@@ -4,7 +4,6 @@
 //! `run.json`. It computes nothing beyond formatting. Scores come from [`lanesweep_run::score`]; text and files go to the
 //! user.
 
-mod case_course;
 mod case_evidence;
 pub mod case_identity;
 mod case_sensitivity;
@@ -26,8 +25,6 @@ pub mod openscenario;
 mod plot;
 pub mod records;
 pub mod sampling;
-mod sampling_figures;
-mod sampling_files;
 mod sampling_page;
 pub mod sampling_tables;
 pub mod study;

@@ -144,21 +144,10 @@ impl MapReport {
         }
         let profile = plan.parts.first().map_or(&self.profile, |part| &part.plan.profile);
         let held = grid.held(profile).join("; ");
-        let sheet = MapSheet {
-            title: format!(
-                "{}: {}, {}",
-                grid.category.label(),
-                mapped.map.models[model].name(),
-                self.criterion.label()
-            ),
-            subtitle: format!("Profile {}, map {}. In every cell: {held}.", self.profile.name, grid.name),
-            grid,
-            outcomes,
-            cells,
-            not_preventable,
-            notes,
-        };
-        sheet.figure().svg()
+        let model = mapped.map.models[model].name();
+        let title = format!("{}: {model}, {}", grid.category.label(), self.criterion.label());
+        let subtitle = format!("Profile {}, map {}. In every cell: {held}.", self.profile.name, grid.name);
+        MapSheet { grid, outcomes, cells, not_preventable }.figure(title, subtitle, notes).svg()
     }
 }
 

@@ -10,10 +10,6 @@ use lanesweep_run::grid::{CellOutcome, Grid, boundary, runs};
 
 /// A sheet.
 pub(super) struct MapSheet<'a> {
-    /// Heading; wrapped when long.
-    pub title: String,
-    /// Line below the heading; wrapped when long.
-    pub subtitle: String,
     /// The grid.
     pub grid: &'a Grid,
     /// Outcomes that tables and legends count.
@@ -22,8 +18,6 @@ pub(super) struct MapSheet<'a> {
     pub cells: Vec<CellOutcome>,
     /// Per cell: whether it is not preventable. Its boundary is drawn if known.
     pub not_preventable: Option<Vec<bool>>,
-    /// Notes at the foot.
-    pub notes: Vec<String>,
 }
 
 /// Colour of the boundary of cases that are not preventable.
@@ -45,23 +39,21 @@ pub(super) fn colour(outcome: CellOutcome) -> &'static str {
 }
 
 impl MapSheet<'_> {
-    /// The sheet as a figure.
-    pub(super) fn figure(&self) -> Figure {
+    /// The sheet as a figure with these notes at its foot.
+    pub(super) fn figure(&self, title: String, subtitle: String, notes: Vec<String>) -> Figure {
         let (columns, plots) = self.trellis();
+        let none = match &self.not_preventable {
+            Some(cells) if !cells.contains(&true) => " In no cell do CCHDM and FSM both collide.",
+            _ => "",
+        };
         Figure {
-            title: self.title.clone(),
-            subtitle: Some(self.subtitle.clone()),
+            title,
+            subtitle: Some(subtitle),
             plots,
             columns,
             is_wide: columns > MAX_NARROW,
-            caption: match &self.not_preventable {
-                Some(cells) if !cells.contains(&true) => {
-                    "Black lines: the boundary, between cells of different kinds. In no cell do CCHDM and FSM both collide."
-                }
-                _ => "Black lines: the boundary, between cells of different kinds.",
-            }
-            .to_owned(),
-            notes: ("Notes:", self.notes.clone()),
+            caption: format!("Black lines: the boundary, between cells of different kinds.{none}"),
+            notes: ("Notes:", notes),
         }
     }
 
@@ -108,7 +100,7 @@ impl MapSheet<'_> {
         }
         let at = |(i, j): (usize, usize)| (across[i], up[j]);
         let lines = boundary(self.grid, &kind).into_iter().map(|(a, b)| vec![at(a), at(b)]);
-        let attributes = "class=\"boundary\" stroke-linecap=\"square\"".to_owned();
+        let attributes = "class=\"boundary\" stroke-linecap=\"square\"";
         let rule = Rule { runs: lines.collect(), colour: INK, width_px: 1.2, attributes, ..Rule::default() };
         let not_preventable = self.not_preventable.iter().filter(|cells| cells.contains(&true)).map(|cells| {
             let kind = |i: usize, j: usize| usize::from(cells[self.grid.cell(panel, i, j)]);
@@ -121,11 +113,11 @@ impl MapSheet<'_> {
                 colour: BOUNDARY,
                 width_px: 1.8,
                 dash: "5 3",
-                attributes: "class=\"not-preventable\"".to_owned(),
+                attributes: "class=\"not-preventable\"",
                 ..Rule::default()
             }
         });
-        let axis = |title, edges: &[f64]| PlotAxis::exactly(title, edges[0], edges[edges.len() - 1]);
+        let axis = |title, edges: &[f64]| PlotAxis::new(title, edges[0], edges[edges.len() - 1]);
         Plot {
             heading: self.panel_name(panel, first),
             x: axis(self.grid.x.parameter.title(), &across),

@@ -2,122 +2,87 @@
 
 use std::fmt::Write;
 
-use serde::Serialize;
-
 use super::host::Host;
-use super::records::{PROGRAM, document, record};
+use super::records::{PROGRAM, document, publish, record};
+use super::sampling_tables::convergence_table;
 use super::tables::paragraph;
 use lanesweep_engine::generated::ATTEMPTS;
-use lanesweep_engine::{ENGINE_VERSION, Headway, LanePlan, SampleTally};
-use lanesweep_model::profile::Profile;
-use lanesweep_model::scenario::Category;
-use lanesweep_run::sampling::{EstimateRow, RiskRate, SampleOptions};
-use lanesweep_stats::density::{DensityModel, Provenance};
-use lanesweep_stats::estimate::{IntervalKind, SearchRound, WeightFigures};
+use lanesweep_engine::{ENGINE_VERSION, LanePlan, SampleTally};
+use lanesweep_model::scenario::parameterization::Parameterization;
+use lanesweep_run::sampling::{EstimateRow, RiskRate, Sample, SampleResult, proposal_text};
+use lanesweep_stats::estimate::{IntervalKind, WeightFigures};
 use lanesweep_support::Result;
 use lanesweep_support::readable::{count, count_of, counted, significant, value};
-use lanesweep_support::run_folder::ResultFiles;
+use lanesweep_support::run_folder::{ResultFiles, Results};
 use lanesweep_support::table::{Column, Digits, NumberText, Table, TableOf};
 
-/// The density of a run.
-#[derive(Debug, Clone, Serialize)]
-pub(super) struct DensityRecord {
-    /// SHA-256 of its content.
-    pub sha256: String,
-    /// Category.
-    pub category: Category,
-    /// Parameterization.
-    pub parameterization: String,
-    /// Names of the parameters.
-    pub parameters: Vec<String>,
-    /// Number of scenarios in its fit.
-    pub kernels: usize,
-    /// Provenance of its data.
-    pub provenance: Provenance,
+/// A sampling run with what its files state.
+pub struct SampleReport<'a> {
+    /// The run.
+    pub sample: &'a Sample,
+    /// Its result.
+    pub result: &'a SampleResult,
+    /// The machine.
+    pub host: Host,
 }
 
-impl DensityRecord {
-    /// From a density.
+impl<'a> SampleReport<'a> {
+    /// Writes every file of the run to its folder, the record last; returns the names of the others.
     ///
     /// # Errors
-    /// As [`DensityModel::content_sha256`].
-    pub(super) fn of(density: &DensityModel) -> Result<DensityRecord> {
-        Ok(DensityRecord {
-            sha256: density.content_sha256()?,
-            category: density.category(),
-            parameterization: density.space.id().key.to_string(),
-            parameters: density.space.parameters().iter().map(|p| p.name.clone()).collect(),
-            kernels: density.kde.points().len(),
-            provenance: density.provenance.clone(),
-        })
-    }
-}
-
-/// Draws of crude Monte Carlo.
-#[derive(Debug, Clone, Serialize)]
-pub(super) struct DrawRecord {
-    /// Ranges of drawn sample indices: [first, one past the last].
-    pub ranges: Vec<[u64; 2]>,
-    /// Samples, void ones included.
-    pub samples: u64,
-    /// Samples without a valid point; no estimate counts them.
-    pub voids: u64,
-    /// Total number of draws.
-    pub tries: u64,
-    /// Fraction of invalid draws.
-    pub rejected_share: f64,
-    /// Lanes.
-    pub lanes: u64,
-    /// Lanes that ended at the time cap.
-    pub capped_lanes: u64,
-}
-
-impl DrawRecord {
-    /// The draws of one tally.
-    pub(super) fn of(tally: &SampleTally, plan: &LanePlan) -> DrawRecord {
-        let rejected = tally.tries - tally.valid().min(tally.tries);
-        DrawRecord {
-            ranges: tally.covered().iter().map(|r| [r.start, r.end]).collect(),
-            samples: tally.samples(),
-            voids: tally.voids,
-            tries: tally.tries,
-            rejected_share: rejected as f64 / tally.tries.max(1) as f64,
-            lanes: tally.samples() * plan.lanes_per_unit(&plan.blocks[0]),
-            capped_lanes: tally.capped.iter().sum(),
+    /// [`lanesweep_support::Error::Io`].
+    pub fn write(&self, mut results: Results) -> Result<ResultFiles> {
+        let density = &self.sample.density;
+        if let Some(run) = &self.result.crude {
+            results.add_table("tables/convergence.csv", convergence_table(&run.convergence))?;
         }
+        if let Some(proposal) = &self.result.proposal {
+            results.add("proposal.json", proposal_text(density, proposal)?.as_bytes())?;
+        }
+        results.add("density.json", &density.to_json()?)?;
+        results.add_table("estimates.csv", self.estimate_rows())?;
+        results.add("report.html", self.html()?.as_bytes())?;
+        publish(results, |files| self.json(files))
     }
-}
 
-/// A sampling run with the facts that its files state.
-pub struct SampleReport {
-    /// The density sampled.
-    pub(super) density: DensityRecord,
-    /// Profile, with its time step.
-    pub(super) profile: Profile,
-    /// Options, as in the plan.
-    pub(super) options: SampleOptions,
+    pub(super) fn estimates(&self) -> &'a [EstimateRow] {
+        &self.result.rows
+    }
+
+    /// The sampled parameterization.
+    pub(super) fn id(&self) -> &'a Parameterization {
+        self.sample.density.space.id()
+    }
+
     /// Headways, by name.
-    pub(super) headways: Vec<String>,
-    /// Headways, as in the plan.
-    pub(super) plan_headways: Vec<Headway>,
-    /// Hash of the plan; only for crude Monte Carlo.
-    pub(super) plan_sha256: Option<String>,
-    /// Draws; only for crude Monte Carlo.
-    pub(super) draws: Option<DrawRecord>,
-    /// Estimates.
-    pub(super) estimates: Vec<EstimateRow>,
-    /// Rounds of the search of importance sampling.
-    pub(super) search: Vec<SearchRound>,
-    /// The machine.
-    pub(super) host: Host,
-}
+    pub(super) fn headways(&self) -> Vec<String> {
+        (0..self.sample.options.headways().len().max(1)).map(|at| self.sample.options.headway_name(at)).collect()
+    }
 
-impl SampleReport {
+    /// Draws of crude Monte Carlo and their plan.
+    pub(super) fn drawn(&self) -> Option<(&'a SampleTally, &'a LanePlan)> {
+        self.result.crude.as_ref().map(|crude| &crude.tally).zip(self.sample.lane_plan())
+    }
+
     /// `estimate.json`; `files` are in the same folder.
     ///
     /// # Errors
     /// None for a record of this program.
     pub fn json(&self, files: &ResultFiles) -> Result<String> {
+        let (sample, density, options) = (self.sample, &self.sample.density, &self.sample.options);
+        let draws = self.drawn().map(|(tally, plan)| {
+            record! {
+                // Ranges of drawn sample indices: [first, one past the last].
+                ranges: tally.covered().iter().map(|range| [range.start, range.end]).collect::<Vec<_>>(),
+                samples: tally.samples(),
+                // Samples without a valid point; no estimate counts them.
+                voids: tally.voids,
+                tries: tally.tries,
+                rejected_share: rejected(tally),
+                lanes: lanes(tally, plan),
+                capped_lanes: tally.capped.iter().sum::<u64>(),
+            }
+        });
         document(&record! {
             lanesweep_estimate: 1,
             program: PROGRAM,
@@ -125,22 +90,30 @@ impl SampleReport {
             engine: ENGINE_VERSION,
             commit: self.host.commit(),
             // With `mc`, rows of rare failures may be of importance sampling.
-            estimator: self.options.estimator.key(),
-            density: &self.density,
-            profile: &self.profile,
-            models: &self.options.models,
-            headways: &self.headways,
-            plan_headways: &self.plan_headways,
-            samples: self.options.stop.samples,
-            seed: self.options.seed,
-            plan_sha256: &self.plan_sha256,
-            draws: &self.draws,
-            options: &self.options,
+            estimator: options.estimator.key(),
+            density: record! {
+                sha256: density.content_sha256()?,
+                category: self.id().category,
+                parameterization: self.id().key,
+                parameters: density.space.parameters().iter().map(|of| &of.name).collect::<Vec<_>>(),
+                kernels: density.kde.points().len(),
+                provenance: &density.provenance,
+            },
+            profile: &sample.profile,
+            models: &options.models,
+            headways: self.headways(),
+            plan_headways: options.headways(),
+            samples: options.stop.samples,
+            seed: options.seed,
+            // Only for crude Monte Carlo.
+            plan_sha256: self.drawn().map(|(_, plan)| plan.hash()),
+            draws: draws,
+            options: options,
             settings: &self.host.settings,
-            stopped: EstimateRow::stopped(&self.estimates),
+            stopped: EstimateRow::stopped(self.estimates()),
             reproducible: self.is_reproducible(),
-            estimates: &self.estimates,
-            search: &self.search,
+            estimates: self.estimates(),
+            search: &self.result.search,
             #[serde(flatten)]
             files: files,
             host: &self.host,
@@ -149,50 +122,43 @@ impl SampleReport {
 
     /// Whether the same flags give the same numbers on every machine.
     pub(super) fn is_reproducible(&self) -> bool {
-        self.estimates.iter().all(|r| r.estimate.stopped.is_reproducible())
+        self.estimates().iter().all(|r| r.estimate.stopped.is_reproducible())
     }
 
     /// The text for the terminal.
     pub fn text(&self) -> String {
         let mut text = String::new();
-        let density = &self.density;
+        let density = &self.sample.density;
         let _ = writeln!(
             text,
-            "{} {}: density over {} scenarios ({})",
-            density.category.label(),
-            density.parameterization,
-            count_of(density.kernels),
+            "{}: density over {} scenarios ({})",
+            self.name(),
+            count_of(density.kde.points().len()),
             density.provenance.data
         );
-        if let Some(draws) = &self.draws {
+        if let Some((tally, plan)) = self.drawn() {
+            let some = |count: u64, text: String| if count > 0 { text } else { String::new() };
+            let (voids, capped) = (tally.voids, tally.capped.iter().sum());
             let _ = writeln!(
                 text,
                 "{} samples, {} lanes; {:.2} % of the draws invalid and drawn again{}{}",
-                count(draws.samples),
-                count(draws.lanes),
-                100.0 * draws.rejected_share,
-                if draws.voids > 0 {
-                    format!(", {} samples void (none of {ATTEMPTS} draws valid)", count(draws.voids))
-                } else {
-                    String::new()
-                },
-                if draws.capped_lanes > 0 {
-                    format!("; {} lanes ended at the time cap", count(draws.capped_lanes))
-                } else {
-                    String::new()
-                },
+                count(tally.samples()),
+                count(lanes(tally, plan)),
+                100.0 * rejected(tally),
+                some(voids, format!(", {} samples void (none of {ATTEMPTS} draws valid)", count(voids))),
+                some(capped, format!("; {} lanes ended at the time cap", count(capped))),
             );
         }
-        text.push_str(&self.table(|row| row.is_overall(&self.estimates)).text());
+        text.push_str(&self.table(|row| row.is_overall(self.estimates())).text());
         if self.has_rare() {
             text.push_str("Rare failures, by importance sampling:\n");
-            text.push_str(&self.table(|row| row.is_rare_beside(&self.estimates)).text());
+            text.push_str(&self.table(|row| row.is_rare_beside(self.estimates())).text());
         }
         let notes = self.notes();
         for note in notes.iter().take(MAX_NOTES) {
             text += &paragraph(note);
         }
-        let is_compared = self.estimates.iter().any(|row| row.recorded.is_some_and(|of| of.sampled.is_some()));
+        let is_compared = self.estimates().iter().any(|row| row.recorded.is_some_and(|of| of.sampled.is_some()));
         let rest = format!(
             "Intervals at {} %: of the draws, and{}. {}{}",
             value(100.0 * self.level()),
@@ -208,7 +174,7 @@ impl SampleReport {
             }
         );
         text += &paragraph(&rest);
-        if self.density.provenance.synthetic {
+        if density.provenance.synthetic {
             text.push_str("SYNTHETIC DATA: no number above is a statement about real traffic\n");
         }
         text
@@ -222,7 +188,7 @@ impl SampleReport {
 
     /// The table of some estimates. P of possible traffic, rates and P/S are there where a row has them.
     pub(super) fn table(&self, is_in: impl Fn(&EstimateRow) -> bool) -> Table {
-        let has = |of: &dyn Fn(&EstimateRow) -> bool| self.estimates.iter().any(of);
+        let has = |of: &dyn Fn(&EstimateRow) -> bool| self.estimates().iter().any(of);
         let sampled = |row: &EstimateRow| row.recorded.and_then(|recorded| recorded.sampled);
         let ratio = |row| sampled(row).and_then(|r| Some(format!("{} {}", short(r.ratio?), r.verdict.mark())));
         let possible = |row: &EstimateRow| row.no_traffic.map(|of| of.possible_probability);
@@ -235,7 +201,7 @@ impl SampleReport {
                 false => interval_text(interval.low, interval.high, interval.kind),
             })
         };
-        self.named(self.estimates.iter().filter(|row| is_in(row)))
+        self.named(self.estimates().iter().filter(|row| is_in(row)))
             .column(three_digits("P"), |row| row.estimate.probability)
             .column("of the draws", of_draws)
             .column(Column::from("of scenarios").null("–"), |row| of_scenarios(row).map(NumberText))
@@ -256,7 +222,7 @@ impl SampleReport {
     }
 
     /// A row per estimate, with what it is of.
-    fn named<'a>(&self, rows: impl IntoIterator<Item = &'a EstimateRow>) -> TableOf<&'a EstimateRow> {
+    fn named<'r>(&self, rows: impl IntoIterator<Item = &'r EstimateRow>) -> TableOf<&'r EstimateRow> {
         Table::of(rows)
             .column("model", |row| row.model.name())
             .column("criterion", |row| row.criterion.label())
@@ -265,7 +231,8 @@ impl SampleReport {
 
     /// P at both ends of the bandwidth's interval, for the told rows that have it.
     pub(super) fn bandwidths(&self) -> Table {
-        let told = self.estimates.iter().filter(|row| row.is_told(&self.estimates) && row.at_bandwidths[0].is_some());
+        let told =
+            self.estimates().iter().filter(|row| row.is_told(self.estimates()) && row.at_bandwidths[0].is_some());
         let ends = [("narrow", 0), ("wide", 1)];
         self.named(told)
             .columns(
@@ -279,7 +246,7 @@ impl SampleReport {
     /// What the importance weights indicate, for those estimates that have them.
     pub(super) fn weights(&self) -> Table {
         let percent = |name| Column::from(name).digits(Digits::Fixed(2));
-        self.named(self.estimates.iter().filter(|row| row.estimate.weights.is_some()))
+        self.named(self.estimates().iter().filter(|row| row.estimate.weights.is_some()))
             .column(three_digits("variance reduction"), |row| row.estimate.variance_reduction)
             .column("effective failures", weight(|w| w.effective_failures))
             .column(percent("largest weight, %"), weight(|w| 100.0 * w.largest_fraction))
@@ -289,13 +256,22 @@ impl SampleReport {
 
     /// Confidence level of the intervals.
     pub(super) fn level(&self) -> f64 {
-        self.estimates.first().map_or(0.95, |row| row.estimate.interval.level)
+        self.estimates().first().map_or(0.95, |row| row.estimate.interval.level)
     }
 
     /// Whether rare failures have an estimate by importance sampling, too.
     pub(super) fn has_rare(&self) -> bool {
-        self.estimates.iter().any(|row| row.is_rare_beside(&self.estimates))
+        self.estimates().iter().any(|row| row.is_rare_beside(self.estimates()))
     }
+}
+
+/// Fraction of invalid draws.
+fn rejected(tally: &SampleTally) -> f64 {
+    (tally.tries - tally.valid().min(tally.tries)) as f64 / tally.tries.max(1) as f64
+}
+
+fn lanes(tally: &SampleTally, plan: &LanePlan) -> u64 {
+    tally.samples() * plan.lanes_per_unit(&plan.blocks[0])
 }
 
 /// A number of the weights of a row that has them.

@@ -11,7 +11,7 @@ use lanesweep_stats::estimate::{Ratio, Warning, WeightFigures};
 use lanesweep_support::readable::{count, count_of, counted, significant};
 use lanesweep_support::table::{NamedValue, Table};
 
-impl SampleReport {
+impl SampleReport<'_> {
     /// `estimates.csv`.
     pub(super) fn estimate_rows(&self) -> Table {
         let weights: [NamedValue<WeightFigures, f64>; 3] = [
@@ -34,10 +34,12 @@ impl SampleReport {
         let per_hour = |row: &EstimateRow| row.risk.per_hour;
         let per_1000_km = |row: &EstimateRow| row.risk.per_1000_km;
         let [hour, kilometres] = ["risk_per_hour", "risk_per_1000_km"];
-        Table::of(&self.estimates)
-            .column("category", |_| self.density.category.key())
-            .column("variant", |_| self.density.parameterization.as_str())
-            .column("estimator", |row| if row.estimate.weights.is_some() { "is" } else { self.options.estimator.key() })
+        Table::of(self.estimates())
+            .column("category", |_| self.id().category.key())
+            .column("variant", |_| self.id().key)
+            .column("estimator", |row| {
+                if row.estimate.weights.is_some() { "is" } else { self.sample.options.estimator.key() }
+            })
             .column("model", |row| row.model.name())
             .column("criterion", |row| row.criterion.key())
             .column("headway", |row| row.headway.as_str())
@@ -89,7 +91,7 @@ impl SampleReport {
             .column("density", |row| row.estimate.trust.density())
             .column("scenarios", |row| row.estimate.trust.data())
             .column("bandwidth", |row| row.bandwidth.map(BandwidthVerdict::key))
-            .column("data", |_| self.density.provenance.data.as_str())
+            .column("data", |_| self.sample.density.provenance.data.as_str())
             .build()
     }
 }
@@ -125,12 +127,12 @@ pub(super) fn word(choice: impl Serialize) -> Option<String> {
     serde_json::to_value(choice).ok()?.as_str().map(str::to_owned)
 }
 
-impl SampleReport {
+impl SampleReport<'_> {
     /// What is said about the shown rows, each time with what it is said about. Too few scenarios are said once.
     pub(super) fn remarks(&self) -> Vec<(String, String)> {
         let name = |row: &EstimateRow| format!("{} {} {}", row.model.name(), row.criterion.label(), row.headway);
         let (mut remarks, mut few, mut most) = (Vec::new(), Vec::new(), None);
-        for row in self.estimates.iter().filter(|row| row.is_told(&self.estimates)) {
+        for row in self.estimates().iter().filter(|row| row.is_told(self.estimates())) {
             for warning in &row.estimate.trust.warnings {
                 match warning {
                     Warning::FewScenarios { scenarios } => {
@@ -172,7 +174,7 @@ impl SampleReport {
     }
 }
 
-impl SampleReport {
+impl SampleReport<'_> {
     /// How to read the estimates, one sentence after the other.
     pub(super) fn rules(&self) -> impl Iterator<Item = String> {
         self.cautions().chain(self.sources_rule()).chain(self.recorded_rule())
@@ -187,16 +189,16 @@ impl SampleReport {
 
     /// How far the bandwidth changes P; `None` if the density does not know its interval.
     fn bandwidth_rule(&self) -> Option<String> {
-        let [Some(narrow), Some(wide)] = self.estimates.first()?.at_bandwidths else { return None };
+        let [Some(narrow), Some(wide)] = self.estimates().first()?.at_bandwidths else { return None };
         let [narrow, wide] = [narrow, wide].map(|of| significant(of.factor, 2));
-        let of = |verdict| self.estimates.iter().filter(move |row| row.bandwidth == Some(verdict));
+        let of = |verdict| self.estimates().iter().filter(move |row| row.bandwidth == Some(verdict));
         let change = |row: &EstimateRow| {
             let factors = row.at_bandwidths.iter().flatten().map(|of| of.probability / row.estimate.probability);
             factors.map(|factor| factor.max(1.0 / factor)).filter(|of| of.is_finite()).fold(1.0, f64::max)
         };
         let most = of(BandwidthVerdict::Decides).map(change).fold(1.0, f64::max);
         let [decided, open] = [BandwidthVerdict::Decides, BandwidthVerdict::Open].map(|verdict| of(verdict).count());
-        let all = self.estimates.len();
+        let all = self.estimates().len();
         let decides = match decided {
             0 => "no row".to_owned(),
             _ => format!("{decided} of {all} rows, by up to {} times", significant(most, 2)),
@@ -210,19 +212,19 @@ impl SampleReport {
 
     /// What P over all headways averages; `None` for a single headway.
     fn mean_rule(&self) -> Option<String> {
-        let is_mean = self.estimates.iter().any(|row| row.headway == "all");
+        let is_mean = self.estimates().iter().any(|row| row.headway == "all");
         is_mean.then(|| {
             format!(
                 "THW all {}: P is the mean over {}, each counting the same; estimates.csv has every one",
-                self.headways.len(),
-                self.headways.join(", ")
+                self.sample.options.headways().len(),
+                self.headways().join(", ")
             )
         })
     }
 
     /// Which draws no traffic has; `None` if there are none.
     fn traffic_rule(&self) -> Option<String> {
-        let fraction = self.estimates.iter().find_map(|row| row.no_traffic)?.fraction;
+        let fraction = self.estimates().iter().find_map(|row| row.no_traffic)?.fraction;
         Some(format!(
             "No such traffic in {} % of {} further draws: the vehicle that cuts out drives through the one ahead of it. P counts \
              them; P possible, without interval, is that of the other draws",
@@ -233,8 +235,8 @@ impl SampleReport {
 
     /// A density of N scenarios is based on no data below a probability of 1/N; `None` where no row is below.
     fn tail_rule(&self) -> Option<String> {
-        let kernels = self.density.kernels;
-        let is_below = self.estimates.iter().any(|row| row.is_overall(&self.estimates) && row.is_of_tails(kernels));
+        let kernels = self.sample.density.kde.points().len();
+        let is_below = self.estimates().iter().any(|row| row.is_overall(self.estimates()) && row.is_of_tails(kernels));
         is_below.then(|| {
             let (resolved, kernels) = (short(1.0 / kernels as f64), count_of(kernels));
             format!("Probabilities below {resolved} (one in {kernels} scenarios) come from the tails of the density's kernels, not from data")
@@ -243,7 +245,7 @@ impl SampleReport {
 
     /// Why there is no rate per hour; `None` if the density draws the headway.
     fn exposure_rule(&self) -> Option<String> {
-        (!self.plan_headways.is_empty()).then(|| {
+        (!self.sample.options.headways().is_empty()).then(|| {
             "No rate per hour or per 1000 km: the headways are imposed; a density fitted `with_thw` draws them and has one"
                 .to_owned()
         })
@@ -251,7 +253,7 @@ impl SampleReport {
 
     /// Where the width of the intervals comes from, and what would halve it; `None` if no row knows.
     fn sources_rule(&self) -> Option<String> {
-        let known: Vec<Uncertainty> = self.estimates.iter().filter_map(|row| row.uncertainty).collect();
+        let known: Vec<Uncertainty> = self.estimates().iter().filter_map(|row| row.uncertainty).collect();
         let range = |values: Vec<f64>| {
             let ends = [values.iter().copied().fold(f64::INFINITY, f64::min), values.into_iter().fold(0.0, f64::max)];
             let [low, high] = ends.map(|end| significant(end, 2));
@@ -279,7 +281,7 @@ impl SampleReport {
 
     /// What the ratio to recorded scenarios and the verdict mean; `None` without a comparison.
     fn recorded_rule(&self) -> Option<String> {
-        self.estimates.iter().any(|row| row.recorded.is_some_and(|of| of.sampled.is_some())).then(|| {
+        self.estimates().iter().any(|row| row.recorded.is_some_and(|of| of.sampled.is_some())).then(|| {
             "P/S: rate of the samples over that of the recorded scenarios (S), from the same headways; = agrees, > too \
              high, < too low, ? undecided (intervals: estimates.csv). The density agrees if S' (the same scenarios under this parameterization) and the \
              samples both fail as often as S to within a quarter: the intervals of S'/S and P/S lie within 0.80 to 1.25. \
@@ -290,7 +292,7 @@ impl SampleReport {
 
     /// What the intervals cover in addition to the draws.
     pub(super) fn interval_rule(&self) -> &'static str {
-        if self.estimates.iter().all(|row| row.failing_scenarios.is_some()) {
+        if self.estimates().iter().all(|row| row.failing_scenarios.is_some()) {
             " of draws and scenarios, at fixed bandwidth and scale; not determined: fewer than 3 scenarios carry P"
         } else {
             " none of what other scenarios would change"

@@ -5,19 +5,18 @@ use super::host::{Host, SweepRecord, Timings};
 use super::html::PageFigure;
 use super::plot::Figure;
 use super::records::{PROGRAM, document, publish, record};
-use super::study_figures::{f1_intervals, headways, radar};
+use super::study_figures::{f1_intervals, radar};
 use super::tables;
 use lanesweep_engine::{ENGINE_VERSION, Headway, Partial, SweepSummary};
 use lanesweep_model::criterion::Criterion;
-use lanesweep_model::driver::ModelId;
 use lanesweep_model::scenario::Category;
-use lanesweep_model::scenario::parameterization::Parameterization;
-use lanesweep_run::score::{Best, Misfit, ScoreTable, f1, published_failures, published_lvd_f1};
+use lanesweep_run::score::{Best, Misfit, f1};
 use lanesweep_run::study::{ReferenceComparison, Study, StudyEvaluation, StudyProvenance};
 use lanesweep_support::Result;
 use lanesweep_support::run_folder::{ResultFiles, Results, TABLES};
 use lanesweep_support::table::Table;
 use serde::Serialize;
+use serde_json::Value;
 
 /// A study's complete report.
 pub struct StudyReport<'a> {
@@ -103,14 +102,11 @@ impl<'a> StudyReport<'a> {
     /// The figures of a category, with the prefixes of their file names; figures without data are skipped.
     fn figures(&self, at: usize) -> Vec<(&'static str, Figure)> {
         let (scores, data) = (&self.evaluation.scores.categories[at], &self.facts().data);
-        let (confidence, mut figures) = (self.evaluation.scores.options.confidence, Vec::new());
-        if scores.variants.len() > 1 {
-            figures.push(("f1", f1_intervals(scores, confidence, data)));
-            figures.push(("radar", radar(scores, data)));
+        if scores.variants.len() < 2 {
+            return Vec::new();
         }
-        let numbers = &self.evaluation.categories[at];
-        figures.extend(headways(&numbers.headways, scores, confidence, data).map(|figure| ("headways", figure)));
-        figures
+        let confidence = self.evaluation.scores.options.confidence;
+        vec![("f1", f1_intervals(scores, confidence, data)), ("radar", radar(scores, data))]
     }
 }
 
@@ -177,9 +173,9 @@ impl StudyReport<'_> {
             categories: self.categories(),
             lanes: plan.lane_count(),
             models: &plan.models,
-            best: self.evaluation.best.iter().map(best).collect::<Vec<_>>(),
-            // The paper's numbers, if they are shown.
-            published: facts.published.then(|| published(&self.evaluation.scores)),
+            best: best_records(&self.evaluation.best),
+            // Differences from the paper's numbers, if these are shown.
+            published: Misfit::of(&self.evaluation.scores).filter(|_| facts.published),
             // Verdicts that differ between binary32 and binary64, if both were run.
             reference: self.comparison.as_ref().map(|of| record! {
                 lanes: of.lanes,
@@ -248,58 +244,11 @@ fn best_table(best: &[Best], data: &str) -> Table {
         .build()
 }
 
-/// A best parameterization; undefined numbers are null.
-fn best(best: &Best) -> impl Serialize {
-    let score = best.score.as_ref();
-    record! {
-        category: best.category.key(),
-        criterion: Criterion::Collision.key(),
-        // Times as many scenarios; null: not with this data.
-        data_for_decision: best.data_for_decision,
-        f1: score.map(|s| s.f1),
-        f1_high: score.map(|s| s.interval.high),
-        f1_low: score.map(|s| s.interval.low),
-        failing_scenarios: best.failing_scenarios,
-        invented_collisions: score.map(|s| s.invented),
-        missed_collisions: score.map(|s| s.missed),
-        model: best.model.name(),
-        s_failures: best.failures,
-        ties_with: score.map(|s| &s.rivals),
-        variant: score.map(|s| &s.variant),
+/// The same for programs; undefined numbers are null.
+fn best_records(best: &[Best]) -> Value {
+    let mut records = best_table(best, "").records();
+    for (record, of) in records.as_array_mut().into_iter().flatten().zip(best) {
+        record["ties_with"] = of.score.as_ref().map(|score| &*score.rivals).into();
     }
-}
-
-/// The paper's numbers, from highD.
-fn published(scores: &ScoreTable) -> impl Serialize + use<> {
-    let cells = || ModelId::ALL.into_iter().flat_map(|model| Criterion::ALL.into_iter().map(move |c| (model, c)));
-    let failures = Category::ALL.into_iter().flat_map(|category| {
-        cells().filter_map(move |(model, criterion)| {
-            let theirs = published_failures(category, model, criterion)?;
-            Some(record! {
-                category: category.key(),
-                criterion: criterion.key(),
-                failures: theirs.failures,
-                model: model.name(),
-                simulations: theirs.simulations,
-            })
-        })
-    });
-    let f1 = Parameterization::of(Category::Lvd).flat_map(|id| {
-        cells().filter_map(move |(model, criterion)| {
-            let f1 = published_lvd_f1(id.key, model, criterion)?;
-            let (category, criterion, model) = (id.category.key(), criterion.key(), model.name());
-            Some(record! { category: category, criterion: criterion, f1: f1, model: model, variant: id.key })
-        })
-    });
-    let misfit = Misfit::of(scores).map(|misfit| {
-        record! {
-            f1_largest: misfit.f1_largest,
-            f1_mean: misfit.f1_mean,
-            f1_values: misfit.f1_values,
-            near: misfit.near,
-            share_rms_points: misfit.rate_rms_points,
-            shares: misfit.rates,
-        }
-    });
-    record! { data: "highD", f1: f1.collect::<Vec<_>>(), failures: failures.collect::<Vec<_>>(), misfit: misfit }
+    records
 }

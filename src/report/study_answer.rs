@@ -13,6 +13,7 @@ use lanesweep_support::table::{NumberText, Table};
 /// Width of the screen in columns, and minimum width of a narrower one.
 const WIDTH: usize = 80;
 const MIN_WIDTH: usize = 40;
+const NO_BREAK: &str = "\u{a0}";
 /// Maximum number of rows of the table.
 const MAX_ROWS: usize = 12;
 /// Maximum characters of a list of parameterizations.
@@ -28,10 +29,12 @@ const NUMBERS: [usize; 2] = [4, 6];
 const LEGEND: &str = "Missed: S alone collides; invented: S' alone. Ties: F1 within chance of the best's; 2.0x: twice the \
                       scenarios would tell, if F1 stays.";
 
-/// The rows, with the columns of words in an order.
-fn table(rows: &[[String; 7]], words: [usize; 4]) -> Table {
-    let words = Table::of(rows).columns(words, |at| HEADER[at], |row, at| row[at].as_str());
-    words.columns(4..7, |at| HEADER[at], |row, at| NumberText(row[at].clone())).build()
+/// A row for a narrow screen, on which an interval stays on one line.
+fn list_of(row: &[String; 7], screen: usize) -> String {
+    let cells = HEADER.iter().zip(row).skip(2).filter(|(_, cell)| !cell.is_empty());
+    let held = |cell: &String| if cell.contains('[') { cell.replace(' ', NO_BREAK) } else { cell.clone() };
+    let cells = cells.map(|(name, cell)| format!("{name}: {}", held(cell)));
+    wrap(&format!("{} {}; {}", row[0], row[1], cells.collect::<Vec<_>>().join("; ")), screen).replace(NO_BREAK, " ")
 }
 
 impl StudyReport<'_> {
@@ -63,16 +66,17 @@ impl StudyReport<'_> {
             let mut row = self.row(best);
             // An interval stays on one line.
             if best.score.is_some() {
-                row[SCORE] = row[SCORE].replace(' ', "\u{a0}");
+                row[SCORE] = row[SCORE].replace(' ', NO_BREAK);
             }
             best.score.iter().for_each(|score| row[2] = variant_name(best.category, &score.variant));
             row
         };
         // On a narrow screen a name would push the number out.
-        let table = |rows: &[[String; 7]]| table(rows, [0, 1, SCORE, 2]);
         let rows: Vec<[String; 7]> = self.evaluation.best.iter().map(named).collect();
+        let words = Table::of(&rows).columns([0, 1, SCORE, 2], |at| HEADER[at], |row, at| row[at].as_str());
+        let table = words.columns(4..7, |at| HEADER[at], |row, at| NumberText(row[at].clone())).build();
         let intro = format!("{}. {LEGEND} {}", self.size(), self.conditions());
-        Section::new("answer", "").intro(intro).tables([table(&rows).captioned(self.question())])
+        Section::new("answer", "").intro(intro).tables([table.captioned(self.question())])
     }
 
     /// The answer in a sentence: by category the parameterization that is best for most drivers.
@@ -174,18 +178,16 @@ impl StudyReport<'_> {
         let widths: [usize; 7] = std::array::from_fn(width);
         // The category has a line of its own.
         let line = |row: &[String; 7]| {
-            let (mut line, mut end) = (String::new(), 0);
-            for (at, cell) in row.iter().enumerate().skip(1) {
-                end += widths[at] + if at > 1 { 2 } else { 0 };
-                let start = end - if NUMBERS.contains(&at) { cell.chars().count() } else { widths[at] };
+            let cell = |at: usize, width: usize| match NUMBERS.contains(&at) {
+                true => format!("{:>width$}", row[at]),
+                false => format!("{:<width$}", row[at]),
+            };
+            let cells = match is_sentence(row, SCORE) {
                 // A sentence in place of an answer extends over the empty columns after it.
-                let gap = start.saturating_sub(line.chars().count()).max(if at > 1 { 2 } else { 0 });
-                if !cell.is_empty() {
-                    line += &" ".repeat(gap);
-                    line += cell;
-                }
-            }
-            line
+                true => vec![cell(1, widths[1]), cell(2, widths[2]), cell(3, widths[3..6].iter().sum::<usize>() + 4)],
+                false => (1..6).map(|at| cell(at, widths[at])).collect(),
+            };
+            format!("{}  {}", cells.join("  "), cell(6, widths[6])).trim_end().to_owned()
         };
         let mut lines = vec![line(&header)];
         for of in shown.chunk_by(|a, b| a.category == b.category) {
@@ -202,7 +204,7 @@ impl StudyReport<'_> {
             lines.extend(of.iter().map(|best| line(&self.row(best))));
         }
         if lines.iter().flat_map(|text| text.lines()).any(|line| line.chars().count() > screen) {
-            lines = table(&known, [0, 1, 2, SCORE]).fitted(2, screen).lines().map(str::to_owned).collect();
+            lines = known.iter().map(|row| list_of(row, screen)).collect();
         }
         let more = self.evaluation.best.len().saturating_sub(MAX_ROWS);
         if more > 0 {

@@ -1,94 +1,12 @@
-//! The figures of a study: F1 with intervals and as the radar chart of the paper, failures against the headway.
+//! The figures of a study: F1 with intervals and as the radar chart of the paper.
 
 use super::dots::dots;
-use super::plot::{AxisScale, Figure, INK, Look, Mark, Name, Plot, PlotAxis, Series, Value, is_few};
-use lanesweep_engine::Headway;
+use super::plot::{Figure, Look, Mark, Name, Plot, PlotAxis, Series, Value, is_few};
 use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::scenario::Category;
 use lanesweep_model::scenario::parameterization::Parameterization;
-use lanesweep_run::score::{CROSS_VALIDATED, CategoryScores, HeadwayFailures, ScoreInterval, f1};
-use lanesweep_stats::estimate::wilson;
-
-/// Fraction of the scenarios that fail, over the headway: S with its interval, beside it every S'; a panel per model
-/// and criterion. `None` with fewer than two headways that are the same for all scenarios.
-pub(super) fn headways(of: &HeadwayFailures, scores: &CategoryScores, confidence: f64, data: &str) -> Option<Figure> {
-    if of.headways.iter().filter_map(Headway::value).count() < 2 {
-        return None;
-    }
-    let judged = scores.judged();
-    let shown: Vec<usize> = std::iter::once(0).chain(judged.iter().copied()).collect();
-    let is_gap = of.headways.iter().any(|headway| matches!(headway, Headway::GapM(_)));
-    let cells: Vec<(usize, Criterion)> =
-        (0..of.models.len()).flat_map(|model| Criterion::ALL.map(|criterion| (model, criterion))).collect();
-    let count = |variant: usize, (model, criterion): (usize, Criterion)| {
-        move |at: usize| of.count((variant, at, model, criterion))
-    };
-    // One lane per scenario and headway.
-    let share = |count: u64| 100.0 * count as f64 / scores.scenarios.max(1) as f64;
-    let panel = |&cell: &(usize, Criterion)| {
-        let series = |variant: usize| {
-            let value = |(at, headway): (usize, &Headway)| {
-                let failed = count(variant, cell)(at);
-                let interval = wilson(failed as f64, scores.scenarios as f64, confidence);
-                let is_few = variant == 0 && is_few(failed as f64);
-                Some(Value {
-                    label: if is_few { failed.to_string() } else { String::new() },
-                    interval: (variant == 0).then_some((100.0 * interval.low, 100.0 * interval.high)),
-                    is_few,
-                    ..Value::from((headway.value()?, share(failed)))
-                })
-            };
-            let mut values: Vec<Value> = of.headways.iter().enumerate().filter_map(value).collect();
-            values.sort_by(|a, b| a.x.total_cmp(&b.x));
-            // A number once is enough for neighbours that share it.
-            let numbers: Vec<String> = values.iter().map(|value| value.label.clone()).collect();
-            for (value, pair) in values.iter_mut().skip(1).zip(numbers.windows(2)) {
-                if pair[0] == pair[1] {
-                    value.label.clear();
-                }
-            }
-            if variant == 0 {
-                let look = Look { colour: INK, line_px: 1.8, marker_px: 3.0, ..Look::of(0, 1) };
-                let marks = &[Mark::Band, Mark::Line, Mark::Points];
-                return Series::new("S, as recorded", marks, values).with_look(look);
-            }
-            let look = Look { line_px: 1.2, ..look_of(&judged, variant) };
-            Series::new(legend_name(scores, variant), &[Mark::Line], values).with_look(look)
-        };
-        let shares = shown.iter().flat_map(|&variant| (0..of.headways.len()).map(count(variant, cell)));
-        let (least, most) = shares.fold((u64::MAX, 0), |(low, high), count| (low.min(count), high.max(count)));
-        let scale = if least > most / 3 { AxisScale::Linear } else { AxisScale::SquareRoot };
-        Plot {
-            heading: format!("{}, {}", of.models[cell.0].name(), cell.1.label()),
-            x: PlotAxis::around(
-                if is_gap { "initial gap in m" } else { "initial time headway in s" },
-                AxisScale::Linear,
-                of.headways.iter().filter_map(Headway::value).chain([0.0]).collect(),
-            ),
-            y: PlotAxis { scale, ..PlotAxis::new("failed scenarios in %") },
-            series: shown.iter().copied().map(series).collect(),
-            ..Plot::default()
-        }
-    };
-    let fails = |cell: &&(usize, Criterion)| {
-        shown.iter().any(|variant| (0..of.headways.len()).any(|at| count(*variant, **cell)(at) > 0))
-    };
-    let empty = cells.iter().filter(|cell| !fails(cell));
-    let empty = empty.map(|(model, criterion)| format!("{}, {}", of.models[*model].name(), criterion.label()));
-    Some(Figure {
-        caption: format!(
-            "Black: share of the recorded scenarios in which the driver model fails the criterion; band: its {} % \
-             interval over scenarios. Colours: the same scenarios, parameterized. Vertical axes by the square root from \
-             0, or linear where all shares are large. Of equal numbers in a row the first is written.",
-            100.0 * confidence
-        ),
-        plots: cells.iter().filter(fails).map(panel).collect(),
-        columns: Criterion::ALL.len(),
-        notes: ("Left out, because nothing fails:", empty.collect()),
-        ..titled(scores, "failures against the headway", data)
-    })
-}
+use lanesweep_run::score::{CROSS_VALIDATED, CategoryScores, ScoreInterval, f1};
 
 /// `FSM, TTC`.
 fn cell_name((model, criterion): &(ModelId, Criterion)) -> String {
@@ -152,7 +70,7 @@ pub(super) fn f1_intervals(scores: &CategoryScores, confidence: f64, data: &str)
              nor S' fails.",
             100.0 * confidence
         ),
-        plots: vec![dots(&rows, PlotAxis::exactly("F1", -0.02, 1.02), series)],
+        plots: vec![dots(&rows, PlotAxis::new("F1", -0.02, 1.02), series)],
         ..titled(scores, "F1 of parameterized against recorded scenarios", data)
     }
 }
@@ -188,9 +106,9 @@ pub(super) fn radar(scores: &CategoryScores, data: &str) -> Figure {
     let plot = Plot {
         x: PlotAxis {
             names: cells.iter().enumerate().map(name).collect(),
-            ..PlotAxis::exactly("", 0.0, cells.len() as f64)
+            ..PlotAxis::new("", 0.0, cells.len() as f64)
         },
-        y: PlotAxis { names: rings.to_vec(), ..PlotAxis::exactly("F1", 0.0, 1.0) },
+        y: PlotAxis { names: rings.to_vec(), ..PlotAxis::new("F1", 0.0, 1.0) },
         series: variants.iter().copied().map(series).collect(),
         is_polar: true,
         ..Plot::default()

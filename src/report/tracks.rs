@@ -98,8 +98,8 @@ pub fn across(recording: &Recording) -> Figure {
         let (low, high) = range(&mut rules.iter().flat_map(|rule| rule.runs.iter().flatten().map(|point| point.1)));
         plots.push(Plot {
             heading: format!("carriageway {}, {} tracks", carriageway.name, count_of(tracks.len())),
-            x: PlotAxis::exactly("position along the road, m", 0.0, (end - begin).max(1.0)),
-            y: PlotAxis::exactly("position from the left edge of the leftmost lane, m", low, high),
+            x: PlotAxis::new("position along the road, m", 0.0, (end - begin).max(1.0)),
+            y: PlotAxis::new("position from the left edge of the leftmost lane, m", low, high),
             rules,
             ..Plot::default()
         });

@@ -7,13 +7,12 @@ use serde::Serialize;
 use crate::lanes::outcome_record;
 use crate::records::record;
 use lanesweep_engine::verify::{Comparison, DifferingLane, GroupComparison};
-use lanesweep_engine::{Outcome, words};
 use lanesweep_model::criterion::Criterion;
-use lanesweep_support::readable::{count, value};
+use lanesweep_support::readable::count;
 use lanesweep_support::table::{NumberText, Table};
 
 /// One set of lanes: what was compared per category and model, and the differences.
-pub fn comparison(comparison: &Comparison) -> String {
+pub fn comparison(comparison: &Comparison, dt_s: f64) -> String {
     let share = |tally: &GroupComparison, criterion: Criterion| {
         let mark = if tally.tests(criterion) { "" } else { "*" };
         NumberText(format!("{:.1}{mark}", 100.0 * tally.share(criterion)))
@@ -40,7 +39,7 @@ pub fn comparison(comparison: &Comparison) -> String {
     for lane in &comparison.worst {
         let _ = writeln!(text, "  {} differs in {}", lane.key, lane.names().join(", "));
     }
-    comparison.worst.first().map_or(text.clone(), |worst| text + &lane(worst))
+    comparison.worst.first().map_or(text.clone(), |worst| text + &lane(worst, dt_s))
 }
 
 /// The same as [`comparison`], as JSON.
@@ -74,41 +73,14 @@ pub fn record(comparison: &Comparison, dt_s: f64) -> impl Serialize + use<> {
     }
 }
 
-/// The words of a lane on the CPU and on the device.
-fn lane(lane: &DifferingLane) -> String {
-    let outcomes = [lane.cpu, lane.tested];
-    let (all, shown) = (outcomes.map(|o| words(&o)), outcomes.map(|o| shown(&o)));
-    let word = |at: usize, k: usize| {
-        let mark = if k == 0 || all[0][at] == all[1][at] { "" } else { "  ≠" };
-        NumberText(format!("{}{mark}", shown[k][at]))
-    };
-    let names = ["CPU, f32", "under test"];
-    let rows =
-        Table::of(0..all[0].len()).column("word", |at| all[0][at].0).columns(0..2, |k| names[k].to_owned(), word);
-    format!("{}\n{}", lane.key, rows.build().text())
-}
-
-/// The words for people. Numbers have all digits, because a difference may be in the last one.
-fn shown(o: &Outcome<f64>) -> [String; 17] {
-    let number = |v: f64| if v.is_finite() { v.to_string() } else { value(v) };
-    let step = |step: u32| if step == u32::MAX { "never".to_owned() } else { step.to_string() };
-    [
-        format!("{:04b}", o.verdicts.0),
-        format!("{} ({})", o.contact.code(), o.contact.label()),
-        o.contact_with.to_string(),
-        format!("{:?}", o.end),
-        step(o.reaction_step),
-        step(o.contact_step),
-        step(o.end_step),
-        number(o.impact_speed),
-        number(o.impact_closing_speed),
-        number(o.min_ttc),
-        number(o.max_btn),
-        number(o.min_gap),
-        number(o.min_thw),
-        number(o.max_drac),
-        o.tet_steps.to_string(),
-        number(o.tit),
-        o.pet.map_or_else(|| "none".to_owned(), number),
-    ]
+/// How a lane ended on the CPU and on the device, with all digits, because a difference may be in the last one.
+fn lane(DifferingLane { key, cpu, tested }: &DifferingLane, dt_s: f64) -> String {
+    let [cpu, tested] = [cpu, tested].map(|outcome| outcome_record(outcome, dt_s));
+    let rows = Table::of(cpu.iter().zip(tested.values()))
+        .column("value", |((name, _), _)| name.as_str())
+        .column("CPU, f32", |((_, cpu), _)| NumberText(cpu.to_string()))
+        .column("under test", |((_, cpu), tested)| {
+            NumberText(format!("{tested}{}", if cpu == tested { "" } else { "  ≠" }))
+        });
+    format!("{key}\n{}", rows.build().text())
 }

@@ -106,28 +106,18 @@ fn prefix(target: &Path) -> OsString {
     prefix
 }
 
-/// The error for a file that cannot be created. If the folder is missing, the system's message does not name it.
-fn not_begun(target: &Path, source: std::io::Error) -> Error {
-    if source.kind() != ErrorKind::NotFound {
-        return Error::io(target, "write", source);
-    }
-    let why = format!("there is no folder {}", folder_of(target).display());
-    Error::io(target, "write", std::io::Error::new(ErrorKind::NotFound, why))
-}
-
-/// The error for a failure after the file was created. The system's "no such file" does not name the file: the result's
-/// name is new, and the user does not know the hidden one.
+/// The error for a failure to write. The system's "no such file" names neither file nor folder: the result's name is new, and
+/// the user does not know the hidden one.
 fn failed(target: &Path, source: std::io::Error) -> Error {
     if source.kind() != ErrorKind::NotFound {
         return Error::io(target, "write", source);
     }
     let folder = folder_of(target);
-    let why = if folder.is_dir() {
-        "the unfinished file was removed while it was written, by another program".to_owned()
-    } else {
-        format!("the folder {} vanished while the file was written", folder.display())
+    let why = match folder.is_dir() {
+        true => "the unfinished file was removed while it was written, by another program".to_owned(),
+        false => format!("there is no folder {}", folder.display()),
     };
-    Error::io(target, "write", std::io::Error::other(why))
+    Error::io(target, "write", std::io::Error::new(ErrorKind::NotFound, why))
 }
 
 /// Makes a rename in `folder` survive a power loss, if the system supports it.
@@ -194,7 +184,7 @@ impl AtomicFile {
         let mut registry = live();
         let mut tries = 0;
         let file = loop {
-            let file = builder.tempfile_in(folder_of(target)).map_err(|source| not_begun(target, source))?;
+            let file = builder.tempfile_in(folder_of(target)).map_err(|source| failed(target, source))?;
             // Another process may hold the lock while it checks for stale files. A file system without locks keeps
             // stale files.
             match file.as_file().try_lock() {

@@ -93,6 +93,26 @@ pub fn shown_json(json: &str) -> Cow<'_, str> {
     escaped(json, &['\n'], |c| format!("\\u{:04x}", u32::from(c)))
 }
 
+/// Escapes a text for HTML and XML 1.0, as content or attribute. Other acting characters, and those that XML never allows, become
+/// U+FFFD.
+pub fn escape_markup(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out += "&amp;",
+            '<' => out += "&lt;",
+            '>' => out += "&gt;",
+            '"' => out += "&quot;",
+            '\'' => out += "&apos;",
+            '\t' | '\r' => out += &format!("&#{};", u32::from(c)),
+            '\u{FFFE}' | '\u{FFFF}' => out.push('\u{FFFD}'),
+            c if acts(c) && c != '\n' => out.push('\u{FFFD}'),
+            c => out.push(c),
+        }
+    }
+    out
+}
+
 /// One word of a POSIX shell, for commands in messages: as it is where nothing in it is special, else in single quotes.
 pub fn quoted_word(word: &str) -> String {
     // `=` is special: before a command it makes an assignment.

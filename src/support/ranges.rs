@@ -98,37 +98,28 @@ fn check_value(name: &str, value: &Value, schema: &Value) -> Result<()> {
     Err(Error::usage(Place::item(name), format!("{found} cannot be used"), format!("give {range}")))
 }
 
-/// The first value that repeats an earlier one, in words. The list has pairs of a value and its text: `0.60` repeats
-/// `0.6`.
-pub(crate) fn repeated<K: Eq + Hash, S: Display>(list: impl IntoIterator<Item = (K, S)>) -> Option<String> {
-    let mut known: HashMap<K, S> = HashMap::new();
-    for (meaning, written) in list {
-        if let Some(before) = known.get(&meaning) {
-            let (before, written) = (before.to_string(), written.to_string());
-            return Some(match before == written {
-                true => format!("`{written}` is given twice"),
-                false => format!("`{written}` repeats `{before}`"),
-            });
-        }
-        known.insert(meaning, written);
-    }
-    None
-}
-
-/// Checks that no value of a list repeats an earlier one.
+/// Checks that no value of a list, of pairs of a value and its text, repeats an earlier one: `0.60` repeats `0.6`.
 ///
 /// # Errors
-/// [`Error::Usage`] at `place`, with the text of `repeated`.
+/// [`Error::Usage`] at `place`.
 pub fn refuse_repeats<K: Eq + Hash, S: Display>(
     place: impl FnOnce() -> Place,
     list: impl IntoIterator<Item = (K, S)>,
 ) -> Result<()> {
-    let refused = |problem| Error::usage(place(), problem, GIVE_ONCE);
-    repeated(list).map_or(Ok(()), |problem| Err(refused(problem)))
+    let mut known: HashMap<K, S> = HashMap::new();
+    for (meaning, written) in list {
+        if let Some(before) = known.get(&meaning) {
+            let (before, written) = (before.to_string(), written.to_string());
+            let problem = match before == written {
+                true => format!("`{written}` is given twice"),
+                false => format!("`{written}` repeats `{before}`"),
+            };
+            return Err(Error::usage(place(), problem, "give every value once"));
+        }
+        known.insert(meaning, written);
+    }
+    Ok(())
 }
-
-/// Help for a repeated value.
-pub(crate) const GIVE_ONCE: &str = "give every value once";
 
 /// Declares tables of settings, with the default of each field: `pub window_s: f64 = 1.0,`.
 #[macro_export]

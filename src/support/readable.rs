@@ -26,7 +26,12 @@ pub fn counted(length: usize, noun: &str) -> String {
 
 /// Formats a quantity with at most four significant digits and no trailing zeros: `0.45`, `36`, `1,235`, `3.2e-9`, `∞`.
 pub fn value(value: f64) -> String {
-    let text = significant(value, DIGITS);
+    plain(value, DIGITS)
+}
+
+/// The same with at most this many digits.
+pub fn plain(value: f64, digits: usize) -> String {
+    let text = significant(value, digits);
     let (digits, power) = text.split_at(text.find('e').unwrap_or(text.len()));
     match digits.contains('.') {
         true => format!("{}{power}", digits.trim_end_matches('0').trim_end_matches('.')),
@@ -87,40 +92,13 @@ fn grouped(number: &str) -> String {
     format!("{sign}{}{fraction}", groups.join(","))
 }
 
-/// 1, 2 or 5 times a power of ten, as digit and exponent.
-pub type OneTwoFive = (u8, i32);
-
-/// The largest 1, 2 or 5 times a power of ten that is at most `value` (positive, finite).
-pub fn one_two_five(value: f64) -> OneTwoFive {
-    // The shortest decimal text gives digit and exponent without rounding.
-    let written = format!("{value:e}");
-    let (mantissa, exponent) = written.split_once('e').unwrap_or((&written, "0"));
-    let mantissa = mantissa.parse().unwrap_or(1.0);
-    let digit = match mantissa {
-        5.0.. => 5,
-        2.0.. => 2,
-        _ => 1,
-    };
-    (digit, exponent.parse().unwrap_or(0))
-}
-
-/// The neighbour above (`way` = 1) or below (-1).
-pub fn next((digit, exponent): OneTwoFive, way: i32) -> OneTwoFive {
-    match (digit, way > 0) {
-        (1, true) => (2, exponent),
-        (2, true) => (5, exponent),
-        (_, true) => (1, exponent + 1),
-        (1, false) => (5, exponent - 1),
-        (2, false) => (1, exponent),
-        (_, false) => (2, exponent),
-    }
-}
-
 /// The smallest 1, 2 or 5 times a power of ten that is at least `step` (positive).
 pub fn plain_step(step: f64) -> f64 {
     let step = step.max(f64::MIN_POSITIVE);
-    let (digit, exponent) = one_two_five(step);
-    let value = |(digit, exponent): OneTwoFive| format!("{digit}e{exponent}").parse().unwrap_or(step);
-    let below: f64 = value((digit, exponent));
-    if below >= step { below } else { value(next((digit, exponent), 1)) }
+    // The shortest decimal text gives digits and exponent without rounding.
+    let written = format!("{step:e}");
+    let (mantissa, exponent) = written.split_once('e').unwrap_or((&written, "0"));
+    let mantissa = mantissa.parse().unwrap_or(1.0);
+    let digits = [1.0, 2.0, 5.0, 10.0].into_iter().find(|digits| *digits >= mantissa);
+    format!("{}e{exponent}", digits.unwrap_or(10.0)).parse().unwrap_or(step)
 }

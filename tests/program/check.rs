@@ -258,7 +258,8 @@ fn the_sheet_and_the_series_have_one_time_of_braking() {
         // The legend of the figure, and the row of the table.
         let shown = format!("{brakes_s:.3}");
         let shown = shown.trim_end_matches('0');
-        let times = page.matches(&format!(">{shown} s<")).count() + page.matches(&format!(">{shown}<")).count();
+        let times =
+            page.matches(&format!("braking\u{a0}{shown}\u{a0}s")).count() + page.matches(&format!(">{shown}<")).count();
         assert!(times >= 2, "{name}: {shown} s is there {times} times");
     }
     refused(dir.path(), &arguments("cut-in 60 40 15 1 --sheet case.pdf"), 2, ".html");

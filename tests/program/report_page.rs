@@ -49,7 +49,7 @@ fn page(dir: &Path) -> String {
     }
     assert!(["<script", "</script", "<!--"].iter().all(|end| !script.contains(end)), "it ends where it ends");
     assert!(!content.contains("NaN") && !content.contains(">inf<") && !content.contains("<script"));
-    html.replace("&#x2f;", "/")
+    html
 }
 
 /// Scenarios of the generator, as lines of a scenario file.
@@ -80,19 +80,19 @@ fn a_study_says_everything_on_its_page_and_every_figure_has_its_files() {
     for said in ["SYNTHETIC DATA", "Failed simulations of S", "published", plan, "seed", "Claims"] {
         assert!(html.contains(said), "{said}");
     }
-    for figure in ["f1", "radar", "headways"] {
+    for figure in ["f1", "radar"] {
         for category in ["cut-in", "cut-out", "lvd"] {
             let name = format!("figures/{figure}-{category}.svg");
             assert!(html.contains(&format!("<code>{name}</code>")), "{name}");
         }
     }
     let files: Vec<&str> = html.split("<code>").skip(1).map(|rest| rest.split('<').next().unwrap()).collect();
-    assert!(files.len() >= 18);
+    assert!(files.len() >= 12);
     assert!(html.matches("<details>").count() > 6, "all but the answer is folded");
     for file in files {
         assert!(std::fs::metadata(out.join(file)).unwrap().len() > 0, "{file}");
     }
-    assert_eq!(html.matches("<svg").count(), 9);
+    assert_eq!(html.matches("<svg").count(), 6);
 }
 
 #[test]
@@ -125,14 +125,11 @@ fn sampling_runs_maps_and_comparisons_have_their_page() {
     let sample = "sample d/cut-in-2.json --backend cpu --samples 3000";
     quietly(dir, &format!("{sample} --thw 1,0.6,0.2 --out mc"));
     let html = page(&dir.join("mc"));
-    for said in ["figures/convergence.svg", "tables/headways.csv", "<dt>SHA-256 of the density</dt>", "usable"] {
+    for said in ["<dt>SHA-256 of the density</dt>", "usable"] {
         assert!(html.contains(said), "{said}");
     }
     quietly(dir, &format!("{sample} --estimator is --thw 0.2 --models RSS --out is"));
     assert!(page(&dir.join("is")).contains("effective failures"));
-    // The page of an earlier run does not stay beside the results of a later one.
-    quietly(dir, &format!("{sample} --thw 1 --out mc"));
-    assert!(!dir.join("mc/tables/headways.csv").exists());
     let case = "--set ego_speed_kmh=90 --set other_speed_kmh=50";
     quietly(dir, &format!("map cut-in --x gap_m=5..60/5 --y lateral_speed_mps=0.2..1.8/0.4 {case} --out map"));
     let html = page(&dir.join("map"));

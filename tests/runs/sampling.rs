@@ -112,7 +112,7 @@ fn a_run_in_parts_is_the_run_in_one_and_its_failing_lanes_are_the_first_of_all_r
         std::fs::copy(dir.join("seven.csv"), dir.join("counted.csv")).unwrap();
     }
     super::parts::same(&dir.join("whole"), &dir.join("joined"));
-    assert!(dir.join("joined/figures/convergence.svg").exists());
+    assert!(dir.join("joined/tables/convergence.csv").exists());
     let read = |path: &str| std::fs::read_to_string(dir.join(path)).unwrap();
     let rows = read("rows.csv");
     assert_eq!(rows.lines().count(), 1 + 20_000 * 2 * MODELS);

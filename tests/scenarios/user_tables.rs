@@ -7,8 +7,7 @@ use crate::common::tables::made;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use arrow_array::{ArrayRef, BooleanArray, Date32Array, Float64Array, Int32Array, StringArray, StructArray};
-use arrow_schema::{DataType, Field};
+use arrow_array::{ArrayRef, BooleanArray, Date32Array, Float64Array, Int32Array, StringArray};
 use lanesweep::scenario::{Category, Scenario, Side, read_scenario_file, read_scenarios};
 use parquet::basic::Compression;
 
@@ -294,17 +293,6 @@ fn a_table_of_series_with_the_required_columns_is_read_whatever_program_wrote_it
         assert_eq!((b.category, b.kept, b.lead_id), (Category::Lvd, true, Some(12)));
         assert_eq!(b.target.v, [25.0, 10.0]);
     }
-    // Records, as JSON read into a data frame has them.
-    let number = |name: &str| Arc::new(Field::new(name, DataType::Float64, true));
-    let ego = StructArray::from(vec![
-        (number("v0"), numbers(&[30.0, 25.0])),
-        (number("length"), numbers(&[4.5, 4.5])),
-        (number("width"), numbers(&[1.8, 1.8])),
-    ]);
-    let mut columns: Vec<_> = required_columns().into_iter().filter(|(name, _)| !name.starts_with("ego_")).collect();
-    columns.push(("ego", Arc::new(ego)));
-    let [records, series] = [columns, required_columns()].map(|of| through(of, Compression::SNAPPY).unwrap());
-    assert_eq!(records, series);
 }
 
 #[test]

@@ -39,11 +39,6 @@ impl PlayedVehicle {
     pub(super) fn centre_offset_m(&self) -> f64 {
         (REAR_AXLE_FRACTION * self.length_m * 1e3).round() / 1e3
     }
-
-    /// Distance of the axles, m; they are symmetric about the centre.
-    pub(super) fn wheelbase_m(&self) -> f64 {
-        2.0 * self.centre_offset_m()
-    }
 }
 
 /// One concrete scenario.

@@ -10,9 +10,10 @@ use std::path::Path;
 
 use super::DATE;
 use super::concrete::{Concrete, EgoMotion, PlayedVehicle, Vertex, number};
-use super::road::{Road, road_file};
+use super::road::road_file;
 use crate::records::PROGRAM;
 use lanesweep_support::Result;
+use lanesweep_support::plain_text::escape_markup;
 use lanesweep_support::run_folder::RunFolder;
 use lanesweep_support::table::Table;
 
@@ -35,47 +36,6 @@ fn scenario_file(scenario: &Concrete, road: &str) -> Result<String> {
         let (name, value) = (identifier(name), number(*value));
         format!("    <ParameterDeclaration name=\"{name}\" parameterType=\"double\" value=\"{value}\"/>\n")
     });
-    let skipped = usize::from(scenario.ego == EgoMotion::External);
-    let followers = scenario.vehicles.iter().skip(skipped);
-    Ok(format!(
-        r#"<?xml version="1.0" encoding="UTF-8"?>
-<OpenSCENARIO>
-{header}  <ParameterDeclarations>
-{declared}  </ParameterDeclarations>
-  <CatalogLocations/>
-  <RoadNetwork>
-    <LogicFile filepath="{road}"/>
-  </RoadNetwork>
-  <Entities>
-{entities}  </Entities>
-  <Storyboard>
-    <Init>
-      <Actions>
-{starts}      </Actions>
-    </Init>
-    <Story name="story">
-      <Act name="act">
-{paths}        <StartTrigger>
-{begin}        </StartTrigger>
-      </Act>
-    </Story>
-    <StopTrigger>
-{end}    </StopTrigger>
-  </Storyboard>
-</OpenSCENARIO>
-"#,
-        header = header(scenario),
-        declared = declared.collect::<String>(),
-        road = escaped(road),
-        entities = scenario.vehicles.iter().map(entity).collect::<String>(),
-        starts = (0..scenario.vehicles.len()).map(|at| start(scenario, at)).collect::<String>(),
-        paths = followers.map(|vehicle| path(scenario, vehicle)).collect::<String>(),
-        begin = at_time(10, "act start", 0.0),
-        end = at_time(6, "end", scenario.end_s()),
-    ))
-}
-
-fn header(scenario: &Concrete) -> String {
     let synthetic = if scenario.is_synthetic { "SYNTHETIC DATA: " } else { "" };
     let overlap_s = scenario.others_overlap_s().map(number);
     let overlap = overlap_s.as_ref().map_or(String::new(), |time_s| {
@@ -89,48 +49,35 @@ fn header(scenario: &Concrete) -> String {
     let properties = own
         .chain(overlap_s.iter().map(|time_s| (OTHERS_OVERLAP, time_s)))
         .map(|(name, value)| format!("      <Property name=\"{}\" value=\"{}\"/>\n", escaped(name), escaped(value)));
-    format!(
-        "  <FileHeader revMajor=\"1\" revMinor=\"2\" date=\"{DATE}\" description=\"{}\" author=\"{PROGRAM}\">
-    <Properties>
-{}    </Properties>
-  </FileHeader>
-",
-        escaped(&description),
-        properties.collect::<String>()
-    )
+    let skipped = usize::from(scenario.ego == EgoMotion::External);
+    let followers = scenario.vehicles.iter().skip(skipped);
+    Ok(format!(
+        include_str!("../templates/openscenario/scenario.xosc"),
+        date = DATE,
+        program = PROGRAM,
+        description = escaped(&description),
+        properties = properties.collect::<String>(),
+        declared = declared.collect::<String>(),
+        road = escaped(road),
+        entities = scenario.vehicles.iter().map(entity).collect::<String>(),
+        starts = (0..scenario.vehicles.len()).map(|at| start(scenario, at)).collect::<String>(),
+        paths = followers.map(|vehicle| path(scenario, vehicle)).collect::<String>(),
+        end = number(scenario.end_s()),
+    ))
 }
 
 fn entity(vehicle: &PlayedVehicle) -> String {
-    let axle = |at_m: f64, steering: f64| {
-        let (track_m, at_m) = (number(0.85 * vehicle.width_m), number(at_m));
-        format!(
-            "maxSteering=\"{steering}\" wheelDiameter=\"0.6\" trackWidth=\"{track_m}\" positionX=\"{at_m}\" \
-             positionZ=\"0.3\""
-        )
-    };
     format!(
-        r#"    <ScenarioObject name="{name}">
-      <Vehicle name="{name}" vehicleCategory="car">
-        <BoundingBox>
-          <Center x="{centre}" y="0" z="{middle}"/>
-          <Dimensions width="{width}" length="{length}" height="{HEIGHT_M}"/>
-        </BoundingBox>
-        <Performance maxSpeed="150" maxAcceleration="10" maxDeceleration="50"/>
-        <Axles>
-          <FrontAxle {front}/>
-          <RearAxle {rear}/>
-        </Axles>
-        <Properties/>
-      </Vehicle>
-    </ScenarioObject>
-"#,
-        name = escaped(vehicle.name),
+        include_str!("../templates/openscenario/vehicle.xml"),
+        name = vehicle.name,
         centre = number(vehicle.centre_offset_m()),
         middle = HEIGHT_M / 2.0,
+        height = HEIGHT_M,
         width = number(vehicle.width_m),
         length = number(vehicle.length_m),
-        front = axle(vehicle.wheelbase_m(), 0.5),
-        rear = axle(0.0, 0.0),
+        track = number(0.85 * vehicle.width_m),
+        // The axles are symmetric about the centre.
+        wheelbase = number(2.0 * vehicle.centre_offset_m()),
     )
 }
 
@@ -141,19 +88,8 @@ fn start(scenario: &Concrete, at: usize) -> String {
     let is_declared = at == 0 && scenario.parameters.iter().any(|(name, _)| name == EGO_SPEED);
     let is_free = is_declared && scenario.ego == EgoMotion::External;
     format!(
-        r#"        <Private entityRef="{name}">
-          <PrivateAction><TeleportAction>{position}</TeleportAction></PrivateAction>
-          <PrivateAction>
-            <LongitudinalAction>
-              <SpeedAction>
-                <SpeedActionDynamics dynamicsShape="step" value="0" dynamicsDimension="time"/>
-                <SpeedActionTarget><AbsoluteTargetSpeed value="{speed}"/></SpeedActionTarget>
-              </SpeedAction>
-            </LongitudinalAction>
-          </PrivateAction>
-        </Private>
-"#,
-        name = escaped(vehicle.name),
+        include_str!("../templates/openscenario/start.xml"),
+        name = vehicle.name,
         position = position(scenario, vehicle, first),
         speed = if is_free { format!("${EGO_SPEED}") } else { number(first.v_mps) },
     )
@@ -166,54 +102,9 @@ fn path(scenario: &Concrete, vehicle: &PlayedVehicle) -> String {
         format!("{:30}<Vertex time=\"{time_s}\">{position}</Vertex>\n", "")
     };
     format!(
-        r#"        <ManeuverGroup maximumExecutionCount="1" name="{name} group">
-          <Actors selectTriggeringEntities="false">
-            <EntityRef entityRef="{name}"/>
-          </Actors>
-          <Maneuver name="{name} maneuver">
-            <Event name="{name} event" priority="parallel" maximumExecutionCount="1">
-              <Action name="{name} action">
-                <PrivateAction>
-                  <RoutingAction>
-                    <FollowTrajectoryAction>
-                      <TrajectoryRef>
-                        <Trajectory name="{name} trajectory" closed="false">
-                          <Shape>
-                            <Polyline>
-{vertices}                            </Polyline>
-                          </Shape>
-                        </Trajectory>
-                      </TrajectoryRef>
-                      <TimeReference><Timing domainAbsoluteRelative="absolute" scale="1" offset="0"/></TimeReference>
-                      <TrajectoryFollowingMode followingMode="position"/>
-                    </FollowTrajectoryAction>
-                  </RoutingAction>
-                </PrivateAction>
-              </Action>
-              <StartTrigger>
-{begin}              </StartTrigger>
-            </Event>
-          </Maneuver>
-        </ManeuverGroup>
-"#,
-        name = escaped(vehicle.name),
+        include_str!("../templates/openscenario/path.xml"),
+        name = vehicle.name,
         vertices = vehicle.path.iter().map(vertex).collect::<String>(),
-        begin = at_time(16, &format!("{} start", vehicle.name), 0.0),
-    )
-}
-
-/// The condition that the simulation time has reached a value.
-fn at_time(indent: usize, name: &str, time_s: f64) -> String {
-    let (indent, name) = (" ".repeat(indent), escaped(name));
-    let time = format!(
-        "<ByValueCondition><SimulationTimeCondition value=\"{}\" rule=\"greaterOrEqual\"/></ByValueCondition>",
-        number(time_s)
-    );
-    format!(
-        r#"{indent}<ConditionGroup>
-{indent}  <Condition name="{name}" delay="0" conditionEdge="none">{time}</Condition>
-{indent}</ConditionGroup>
-"#
     )
 }
 
@@ -223,25 +114,10 @@ fn position(scenario: &Concrete, vehicle: &PlayedVehicle, centre: &Vertex) -> St
     format!("<Position><WorldPosition x=\"{x_m}\" y=\"{y_m}\" z=\"0\" h=\"0\"/></Position>")
 }
 
-/// A text as the value of an attribute, valid for XML 1.0 and for OpenSCENARIO, where a leading `$` is a parameter.
+/// A text as the value of an attribute. A leading `$` would be a parameter.
 fn escaped(text: &str) -> String {
-    let mut value = String::new();
-    if text.starts_with('$') {
-        value.push(' ');
-    }
-    for c in text.chars() {
-        match c {
-            '<' => value += "&lt;",
-            '>' => value += "&gt;",
-            '&' => value += "&amp;",
-            '\'' => value += "&apos;",
-            '"' => value += "&quot;",
-            '\t' | '\n' | '\r' => value += &format!("&#{};", u32::from(c)),
-            '\0'..' ' | '\u{fffe}' | '\u{ffff}' => value.push('\u{fffd}'),
-            c => value.push(c),
-        }
-    }
-    value
+    let blank = if text.starts_with('$') { " " } else { "" };
+    format!("{blank}{}", escape_markup(text).replace('\n', "&#10;"))
 }
 
 /// A valid identifier: letters, digits and `_`, not starting with a digit.
@@ -284,7 +160,7 @@ pub fn export_folder(dir: &Path, scenarios: &[Concrete]) -> Result<Vec<IndexRow>
         s.properties.iter().map(|(name, _)| name.clone()).filter(|name| name != "lanesweep.lane").collect()
     });
     for ((scenario, row), text) in scenarios.iter().zip(&rows).zip(&texts) {
-        results.add(&row.road, road_file(&Road::around(scenario)).as_bytes())?;
+        results.add(&row.road, road_file(scenario).as_bytes())?;
         results.add(&row.file, text.as_bytes())?;
     }
     let property = |scenario: &Concrete, name: &String| {

@@ -15,19 +15,18 @@ impl Plot {
     ) {
         // As many numbers as have room.
         let has_room = |ticks: &Vec<Tick>| {
-            let widths: Vec<f64> = ticks.iter().flat_map(|tick| &tick.label).map(|label| TICK.text_px(label)).collect();
+            let widths: Vec<f64> = ticks.iter().map(|tick| TICK.text_px(&tick.label)).collect();
             widths.len() > 1 && widths.iter().sum::<f64>() + 10.0 * widths.len() as f64 <= axis.length_px() + 20.0
         };
         let most = (axis.length_px() / 18.0) as usize;
         let ticks = (2..=most).rev().map(|count| axis.ticks(count)).find(has_room);
         let ticks = ticks.unwrap_or_else(|| axis.ticks(2));
         let line = |tick: &Tick, from: f64, to: f64| vec![(tick.at_px, from), (tick.at_px, to)];
-        marks(canvas, &ticks, has_grid, &|tick| line(tick, top, bottom), &|tick, px| line(tick, bottom, bottom + px));
-        for (tick, label) in ticks.iter().filter_map(|tick| Some((tick, tick.label.as_ref()?))).filter(|_| has_numbers)
-        {
+        marks(canvas, &ticks, has_grid, &|tick| line(tick, top, bottom), &|tick| line(tick, bottom, bottom + 4.0));
+        for Tick { at_px, label } in ticks.iter().filter(|_| has_numbers) {
             // A number at an end must not reach into the next plot.
             let (half, (left, right)) = (TICK.text_px(label) / 2.0, axis.ends_px());
-            let x = tick.at_px.clamp(left + half - 3.0, (right - half + 3.0).max(left + half - 3.0));
+            let x = at_px.clamp(left + half - 3.0, (right - half + 3.0).max(left + half - 3.0));
             canvas.text((x, bottom + 17.0), label, TICK, Anchor::Middle);
         }
     }
@@ -53,26 +52,26 @@ pub(super) fn numbers_left(
     (left, right): (f64, f64),
     (has_numbers, has_grid): (bool, bool),
 ) {
-    let ticks = axis.ticks(axis.vertical_numbers());
+    // As many numbers as fit above one another without crowding.
+    let ticks = axis.ticks((axis.length_px() / 18.0).clamp(2.0, 6.0) as usize);
     let line = |tick: &Tick, from: f64, to: f64| vec![(from, tick.at_px), (to, tick.at_px)];
-    marks(canvas, &ticks, has_grid, &|tick| line(tick, left, right), &|tick, px| line(tick, left - px, left));
-    for (tick, label) in ticks.iter().filter_map(|tick| Some((tick, tick.label.as_ref()?))).filter(|_| has_numbers) {
-        canvas.text((left - 7.0, tick.at_px + 4.5), label, TICK, Anchor::End);
+    marks(canvas, &ticks, has_grid, &|tick| line(tick, left, right), &|tick| line(tick, left - 4.0, left));
+    for Tick { at_px, label } in ticks.iter().filter(|_| has_numbers) {
+        canvas.text((left - 7.0, at_px + 4.5), label, TICK, Anchor::End);
     }
 }
 
-/// Draws grid lines at the ticks with numbers, and a longer mark there than at the others.
+/// Draws a grid line and a mark at every tick.
 fn marks(
     canvas: &mut Canvas,
     ticks: &[Tick],
     has_grid: bool,
     grid: &dyn Fn(&Tick) -> Vec<Position>,
-    mark: &dyn Fn(&Tick, f64) -> Vec<Position>,
+    mark: &dyn Fn(&Tick) -> Vec<Position>,
 ) {
-    let numbered = ticks.iter().filter(|tick| tick.label.is_some() && has_grid);
-    canvas.path(&numbered.map(grid).collect::<Vec<_>>(), false, Paint::line(GRID, 0.6));
-    let marks = ticks.iter().map(|tick| mark(tick, if tick.label.is_some() { 4.0 } else { 2.0 }));
-    canvas.path(&marks.collect::<Vec<_>>(), false, Paint::line(GREY, 1.0));
+    let lines = ticks.iter().filter(|_| has_grid).map(grid);
+    canvas.path(&lines.collect::<Vec<_>>(), false, Paint::line(GRID, 0.6));
+    canvas.path(&ticks.iter().map(mark).collect::<Vec<_>>(), false, Paint::line(GREY, 1.0));
 }
 
 /// Draws a spoke's name outside the outer ring: upward at the top, downward at the bottom, centred at the sides.

@@ -1,16 +1,11 @@
 //! What a plot draws: cells (rectangles whose flat colour shows their content), over them rules, over both series
 //! (line, points, band, intervals).
 
-use super::axis::Axes;
+use super::axis::{Axes, is_shown};
 use super::look::Look;
 use super::svg::{Anchor, Canvas, GREY, GRID, Paint, Position, Type, WHITE, set};
 
 pub(crate) const TICK: Type = set(13, false, GREY);
-
-/// A line with more values than this has no markers, because they would hide it.
-const MAX_MARKERS: usize = 40;
-/// Labels are not drawn if there are more than this.
-const MAX_WORDS: usize = 12;
 
 /// A value with fewer failing scenarios than this is drawn hollow.
 const MIN_SCENARIOS: f64 = 10.0;
@@ -30,10 +25,9 @@ pub enum Mark {
     Line,
     /// A marker per value.
     Points,
-    /// The intervals of neighbouring values as an area; the interval of a single value as a line.
+    /// The vertical intervals of neighbouring values as an area.
     Band,
-    /// The interval of each value as a line with a bar at both ends; for a zero on a logarithmic axis an upper limit
-    /// with an arrow.
+    /// The horizontal interval of each value as a line with a bar at both ends.
     Intervals,
 }
 
@@ -46,14 +40,8 @@ pub struct Value {
     pub y: f64,
     /// Ends of its interval.
     pub interval: Option<(f64, f64)>,
-    /// Ends of a wider interval, drawn paler and thinner.
-    pub outer: Option<(f64, f64)>,
     /// Based on few failing scenarios: its marker is hollow.
     pub is_few: bool,
-    /// Label beside it.
-    pub label: String,
-    /// Tooltip of its marker in a browser; empty: row, name and numbers.
-    pub tip: String,
 }
 
 impl From<(f64, f64)> for Value {
@@ -63,8 +51,9 @@ impl From<(f64, f64)> for Value {
 }
 
 impl Value {
-    fn place(&self) -> (f64, f64) {
-        (self.x, self.y)
+    /// Whether axes can show it.
+    pub(super) fn is_shown(&self) -> bool {
+        is_shown(self.x) && is_shown(self.y)
     }
 }
 
@@ -79,10 +68,6 @@ pub struct Series {
     pub values: Vec<Value>,
     /// Own look; `None`: the look of its index in the legend.
     pub look: Option<Look>,
-    /// Intervals are along x instead of y.
-    pub is_sideways: bool,
-    /// SVG attributes of each value's group; empty: `class="value"`.
-    pub attributes: String,
 }
 
 /// Reference lines behind the series.
@@ -101,7 +86,7 @@ pub struct Rule {
     /// Lengths of dashes and gaps, px; empty: solid.
     pub dash: &'static str,
     /// Attributes of the lines' group.
-    pub attributes: String,
+    pub attributes: &'static str,
 }
 
 impl Rule {
@@ -109,7 +94,7 @@ impl Rule {
         let runs: Vec<Vec<Position>> =
             self.runs.iter().map(|run| run.iter().map(|value| axes.at(*value)).collect()).collect();
         let paint = Paint { dash: self.dash, ..Paint::line(self.colour, self.width_px) };
-        canvas.group(&self.attributes, "", |canvas| canvas.path(&runs, false, paint));
+        canvas.group(self.attributes, "", |canvas| canvas.path(&runs, false, paint));
     }
 
     /// Draws the label on the end of the first line: before the end of a level one, beside the end of a steep one.
@@ -159,7 +144,7 @@ impl Series {
     /// neighbour of the first.
     fn runs<'a>(&'a self, axes: &Axes) -> Vec<(Vec<&'a Value>, bool)> {
         let shown: Vec<Option<&Value>> =
-            self.values.iter().map(|value| Some(value).filter(|value| axes.shows(value.place()))).collect();
+            self.values.iter().map(|value| Some(value).filter(|of| of.is_shown())).collect();
         let first_gap = shown.iter().position(Option::is_none);
         let from = if axes.centre.is_some() { first_gap.unwrap_or(0) } else { 0 };
         let closes = axes.centre.is_some() && first_gap.is_none();
@@ -168,34 +153,19 @@ impl Series {
         runs.map(|run| (run.iter().copied().flatten().collect(), closes)).collect()
     }
 
-    /// The ends of a value's interval along x, or along y.
-    pub(super) fn ends_of(&self, value: &Value, along_x: bool) -> Option<(f64, f64)> {
-        value.interval.filter(|_| self.is_sideways == along_x)
-    }
-
-    /// The ends of a value's interval on the page.
-    fn ends(&self, value: &Value, interval: Option<(f64, f64)>, axes: &Axes) -> Option<(Position, Position)> {
-        let (lower, upper) = interval?;
-        let end = |v: f64| axes.at(if self.is_sideways { (v, value.y) } else { (value.x, v) });
-        Some((end(lower), end(upper)))
+    /// The ends of a value's interval along x.
+    pub(super) fn ends_of(&self, value: &Value) -> Option<(f64, f64)> {
+        value.interval.filter(|_| self.has(Mark::Intervals))
     }
 
     pub(super) fn bands(&self, canvas: &mut Canvas, axes: &Axes, look: &Look) {
-        if !self.has(Mark::Band) {
-            return;
-        }
-        type Pick = fn(&Value) -> Option<(f64, f64)>;
-        let intervals: [(Pick, f64); 2] = [(|value| value.outer, 0.09), (|value| value.interval, 0.16)];
-        let runs = self.runs(axes);
-        for ((run, _), (interval, opacity)) in intervals.iter().flat_map(|i| runs.iter().map(move |run| (run, i))) {
-            let ends = run.iter().filter_map(|value| self.ends(value, interval(value), axes));
-            let ends: Vec<(Position, Position)> = ends.collect();
-            let outline = ends.iter().map(|ends| ends.1).chain(ends.iter().rev().map(|ends| ends.0)).collect();
-            let paint = match ends.len() {
-                1 => Paint::line(look.colour, 1.2),
-                _ => Paint { opacity: Some(*opacity), ..Paint::fill(look.colour) },
-            };
-            canvas.path(&[outline], ends.len() > 1, paint);
+        let paint = Paint { opacity: Some(0.16), ..Paint::fill(look.colour) };
+        for (run, _) in self.runs(axes).iter().filter(|_| self.has(Mark::Band)) {
+            let ends: Vec<(f64, (f64, f64))> =
+                run.iter().filter_map(|value| Some((value.x, value.interval?))).collect();
+            let (upper, lower) =
+                (ends.iter().map(|(x, ends)| (*x, ends.1)), ends.iter().rev().map(|(x, ends)| (*x, ends.0)));
+            canvas.path(&[upper.chain(lower).map(|place| axes.at(place)).collect()], true, paint);
         }
     }
 
@@ -217,88 +187,24 @@ impl Series {
         });
     }
 
-    /// Draws intervals and markers. `taken`: existing labels, as left end, width and base line.
-    pub(super) fn markers(
-        &self,
-        canvas: &mut Canvas,
-        axes: &Axes,
-        look: &Look,
-        tip: &dyn Fn(&Value) -> String,
-        taken: &mut Vec<(f64, f64, f64)>,
-    ) {
-        let is_shown =
-            |k: Option<usize>| k.and_then(|k| self.values.get(k)).is_some_and(|value| axes.shows(value.place()));
-        let is_crowded = self.has(Mark::Line) && self.values.len() > MAX_MARKERS;
-        for (k, value) in self.values.iter().enumerate() {
-            let attributes = if self.attributes.is_empty() { "class=\"value\"" } else { &self.attributes };
-            let axis = if self.is_sideways { &axes.x } else { &axes.y };
-            if !axes.shows(value.place()) {
-                // Of a zero the upper end of the widest interval.
-                let widest = value.outer.or(value.interval);
-                let is_zero = (if self.is_sideways { value.x } else { value.y }) == 0.0;
-                let is_limit = is_zero && widest.is_some_and(|ends| axis.holds(ends.1));
-                if let Some((_, upper)) = self.ends(value, widest, axes).filter(|_| is_limit) {
-                    canvas.group("class=\"limit\"", &value.tip, |canvas| self.limit(canvas, upper, look));
-                }
-                continue;
-            }
-            let is_alone = !is_shown(k.checked_sub(1)) && !is_shown(Some(k + 1));
-            if !self.has(Mark::Points) || (is_crowded && !is_alone) {
-                continue;
-            }
+    /// Draws intervals and markers.
+    pub(super) fn markers(&self, canvas: &mut Canvas, axes: &Axes, look: &Look, tip: &dyn Fn(&Value) -> String) {
+        for value in self.values.iter().filter(|value| self.has(Mark::Points) && value.is_shown()) {
             let place = axes.at((value.x, value.y));
-            let tip = if value.tip.is_empty() && self.attributes.is_empty() { tip(value) } else { value.tip.clone() };
-            canvas.group(attributes, &tip, |canvas| {
-                let thin = Look { line_px: 0.5 * look.line_px, ..*look };
-                for (interval, look) in [(value.outer, &thin), (value.interval, look)] {
-                    if let Some(ends) = self.ends(value, interval, axes).filter(|_| self.has(Mark::Intervals)) {
-                        let holds = interval.map_or((false, false), |(low, high)| (axis.holds(low), axis.holds(high)));
-                        self.interval(canvas, ends, holds, look);
-                    }
+            canvas.group("class=\"value\"", &tip(value), |canvas| {
+                if let Some((low, high)) = self.ends_of(value) {
+                    let bar = |(x, y): Position| vec![(x, y - 4.0), (x, y + 4.0)];
+                    let (lower, upper) = (axes.at((low, value.y)), axes.at((high, value.y)));
+                    let runs = [vec![lower, upper], bar(upper), bar(lower)];
+                    canvas.path(&runs, false, Paint::line(look.colour, look.line_px));
                 }
                 Look { is_hollow: value.is_few, ..*look }.marker(canvas, place);
             });
-            // A label per value if there are few; many would cover one another.
-            if !value.label.is_empty() && (self.values.len() <= MAX_WORDS || value.is_few) {
-                label(canvas, (place, look.colour, self.has(Mark::Line)), &value.label, axes, taken);
-            }
         }
-    }
-
-    /// Draws an interval, with a bar at its lower end, at its upper end.
-    fn interval(
-        &self,
-        canvas: &mut Canvas,
-        (lower, upper): (Position, Position),
-        (has_lower, has_upper): (bool, bool),
-        look: &Look,
-    ) {
-        let bar = |(x, y): Position| match self.is_sideways {
-            true => vec![(x, y - 4.0), (x, y + 4.0)],
-            false => vec![(x - 4.0, y), (x + 4.0, y)],
-        };
-        let lower_bar = if has_lower { bar(lower) } else { Vec::new() };
-        let upper_bar = if has_upper { bar(upper) } else { Vec::new() };
-        canvas.path(&[vec![lower, upper], upper_bar, lower_bar], false, Paint::line(look.colour, look.line_px));
-    }
-
-    /// Draws an upper limit: a short bar with an arrow towards lower values.
-    fn limit(&self, canvas: &mut Canvas, (x, y): Position, look: &Look) {
-        // Offset from the bar's middle: along the value axis downwards, and across it.
-        let at = |on: f64, beside: f64| if self.is_sideways { (x - on, y + beside) } else { (x + beside, y + on) };
-        // Earlier limits are wider, so that each stays visible where limits coincide.
-        let half = 1.3 * look.marker_px;
-        let strokes = [vec![at(0.0, -half), at(0.0, half)], vec![at(0.0, 0.0), at(9.0, 0.0)]];
-        canvas.path(&strokes, false, Paint::line(look.colour, 1.6));
-        canvas.path(&[vec![at(8.0, -3.5), at(8.0, 3.5), at(15.0, 0.0)]], true, Paint::fill(look.colour));
     }
 
     /// Draws a sample of the series for the legend.
     pub(super) fn sample(&self, canvas: &mut Canvas, (x, y): Position, width_px: f64, look: &Look) {
-        if self.has(Mark::Band) {
-            let paint = Paint { opacity: Some(0.16), ..Paint::fill(look.colour) };
-            canvas.rect((x, y - 7.0), (x + width_px, y + 7.0), paint);
-        }
         if self.has(Mark::Line) || self.has(Mark::Intervals) {
             let dash = if self.has(Mark::Line) { look.dash } else { "" };
             canvas.path(&[vec![(x, y), (x + width_px, y)]], false, Look { dash, ..*look }.paint());
@@ -355,30 +261,6 @@ impl Cells {
             }
         });
     }
-}
-
-/// Draws a label beside a point, if there is room inside the plot and between the others.
-fn label(
-    canvas: &mut Canvas,
-    (place, colour, is_on_line): (Position, &'static str, bool),
-    words: &str,
-    axes: &Axes,
-    taken: &mut Vec<(f64, f64, f64)>,
-) {
-    let width = TICK.text_px(words);
-    let (right, left, middle) = (6.0, -6.0 - width, -0.5 * width);
-    // Beside a line a number belongs to the point above or below it.
-    let places = match is_on_line {
-        true => vec![(middle, -7.0), (middle, 17.0)],
-        false => vec![(right, 4.5), (left, 4.5), (middle, -7.0), (middle, 17.0), (right, -7.0), (left, 15.0)],
-    };
-    let mut places = places.into_iter().map(|(dx, dy)| (place.0 + dx, place.1 + dy));
-    // A number over the last point may reach beyond the frame.
-    let is_inside = |(x, y): &Position| axes.is_inside((x + 7.0, y - 11.0)) && axes.is_inside((x + width - 7.0, *y));
-    let is_free = |(x, y): &Position| taken.iter().all(|w| *x > w.0 + w.1 || x + width < w.0 || (y - w.2).abs() > 12.0);
-    let Some((x, y)) = places.find(|place| is_inside(place) && is_free(place)) else { return };
-    taken.push((x, width, y));
-    canvas.text((x, y), words, Type { colour, ..TICK }, Anchor::Start);
 }
 
 /// Removes points that lie on the line between their neighbours: a lane has thousands of steps.

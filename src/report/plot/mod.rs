@@ -11,20 +11,21 @@ mod look;
 mod svg;
 
 use std::f64::consts::TAU;
+use std::iter;
 
-pub(super) use axis::AxisScale;
 pub(super) use layer::{Cells, FilledCell, Mark, Rule, Series, Value};
 pub(super) use look::{Look, Symbol};
 
-pub(super) use axis::{logarithmic_reach, number, plain_end};
-use layer::{HOLLOW, fill_sample};
-pub(super) use layer::{TICK, is_few};
-pub(super) use svg::{Anchor, Canvas, GREY, INK, Type, set};
+pub(super) use axis::plain_end;
+pub(super) use layer::is_few;
+use layer::{HOLLOW, TICK, fill_sample};
+pub(super) use svg::{GREY, INK};
 
-use axis::{Axes, on_circle};
+use axis::{Axes, Axis, on_circle};
 use frame::{numbers_left, spoke_name};
+use lanesweep_support::readable::plain;
 use lanesweep_support::table::Table;
-use svg::{GRID, Paint, Position, WHITE};
+use svg::{Anchor, Canvas, GRID, Paint, Position, Type, WHITE, set};
 
 /// Width of a figure: type of 13 px becomes 6 pt at the 252 pt of a paper's column.
 const COLUMN_PX: f64 = 540.0;
@@ -106,24 +107,10 @@ pub enum Height {
 pub struct PlotAxis {
     /// Quantity and unit; wrapped when long.
     pub label: String,
-    /// Scale.
-    pub scale: AxisScale,
-    /// Ends.
-    pub ends: Ends,
+    /// Ends, the lower first.
+    pub ends: (f64, f64),
     /// Names instead of numbers.
     pub names: Vec<Name>,
-}
-
-/// Ends of an axis.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub enum Ends {
-    /// Around the values of the series.
-    #[default]
-    Layers,
-    /// Around these values.
-    Around(Vec<f64>),
-    /// Exactly these two, on a linear axis.
-    Exactly(f64, f64),
 }
 
 /// A named position on an axis.
@@ -140,31 +127,13 @@ pub struct Name {
 }
 
 impl PlotAxis {
-    /// A linear axis around the values of the series.
-    pub(crate) fn new(label: impl Into<String>) -> Self {
-        PlotAxis { label: label.into(), ..PlotAxis::default() }
+    /// An axis with these ends.
+    pub(crate) fn new(label: impl Into<String>, low: f64, high: f64) -> Self {
+        PlotAxis { label: label.into(), ends: (low, high), names: Vec::new() }
     }
 
-    /// A linear axis with these ends.
-    pub(crate) fn exactly(label: impl Into<String>, low: f64, high: f64) -> Self {
-        PlotAxis { ends: Ends::Exactly(low, high), ..PlotAxis::new(label) }
-    }
-
-    /// An axis of this scale around these values.
-    pub(crate) fn around(label: impl Into<String>, scale: AxisScale, values: Vec<f64>) -> Self {
-        PlotAxis { scale, ends: Ends::Around(values), ..PlotAxis::new(label) }
-    }
-
-    fn is_like(&self, other: &PlotAxis) -> bool {
-        self.ends != Ends::Layers && (&self.label, self.scale, &self.ends) == (&other.label, other.scale, &other.ends)
-    }
-
-    fn place(&self, values: impl Iterator<Item = f64>, ends_px: (f64, f64)) -> Option<axis::Axis> {
-        match &self.ends {
-            Ends::Exactly(low, high) => Some(axis::Axis::exactly((*low, *high), ends_px)),
-            Ends::Around(values) => axis::Axis::around(self.scale, values, ends_px),
-            Ends::Layers => axis::Axis::around(self.scale, &values.collect::<Vec<_>>(), ends_px),
-        }
+    fn place(&self, (from_px, to_px): (f64, f64)) -> Axis {
+        Axis { low: self.ends.0, high: self.ends.1, from_px, to_px }
     }
 }
 
@@ -177,71 +146,43 @@ impl Figure {
     /// The figure as a complete SVG document. Texts are XML-escaped; control characters become U+FFFD. The same figure
     /// gives the same bytes. It never fails: a plot without a value says so, and without plots only the texts remain.
     pub fn svg(&self) -> String {
-        self.svg_with(|_, y| y)
+        self.drawn(&self.texts(), None)
     }
 
     /// The figure for a paper, as wide as a column (88 mm) or two (180 mm), and its texts, which are not in it.
     pub(super) fn plain(&self) -> (String, String) {
-        let bare = Figure {
-            title: String::new(),
-            subtitle: None,
-            caption: String::new(),
-            notes: ("", Vec::new()),
-            ..self.clone()
-        };
         let width_mm = if self.is_wide { 180.0 } else { 88.0 };
-        let mut texts = vec![self.title.clone()];
-        texts.extend(self.subtitle.clone());
-        texts.push(self.caption.clone());
-        if self.has_few() {
-            texts.push(HOLLOW.to_owned());
-        }
-        if !self.notes.1.is_empty() {
-            texts.push(self.notes.0.to_owned());
-            texts.extend(self.notes.1.iter().cloned());
-        }
-        let svg = bare.drawn(|_, y| y).in_mm(width_mm).document(&self.title, &self.description());
-        (svg, texts.join("\n") + "\n")
+        let texts = self.texts().concat().into_iter().map(|(.., words)| words + "\n").collect();
+        (self.drawn(&[Vec::new(), Vec::new()], Some(width_mm)), texts)
     }
 
-    /// What a screen reader says: the data, and what the marks are.
-    fn description(&self) -> String {
-        [self.subtitle.as_deref().unwrap_or_default(), &self.caption].join(" ").trim().to_owned()
+    /// The texts above and below the plots, with their type and the space above them.
+    fn texts(&self) -> [Vec<(Type, f64, String)>; 2] {
+        let has_few = self.series().flat_map(|series| &series.values).any(|value| value.is_few);
+        let caption = [&*self.caption, if has_few { HOLLOW } else { "" }].join(" ").trim_end().to_owned();
+        let (heading, lines) = &self.notes;
+        let heading = lines.first().map(|_| (HEADING, 5.0, (*heading).to_owned()));
+        let notes = heading.into_iter().chain(lines.iter().map(|line| (TEXT, 2.0, line.clone())));
+        let subtitle = self.subtitle.iter().map(|subtitle| (TEXT, 3.0, subtitle.clone()));
+        let title = (TITLE, 0.0, self.title.clone());
+        [iter::once(title).chain(subtitle).collect(), iter::once((TEXT, 3.0, caption)).chain(notes).collect()]
     }
 
-    fn has_few(&self) -> bool {
-        self.series().flat_map(|series| &series.values).any(|value| value.is_few)
-    }
-
-    /// The same with what `between` draws below the heading, from a y to the y that it returns.
-    pub(super) fn svg_with(&self, between: impl FnOnce(&mut Canvas, f64) -> f64) -> String {
-        self.drawn(between).document(&self.title, &self.description())
-    }
-
-    fn drawn(&self, between: impl FnOnce(&mut Canvas, f64) -> f64) -> Canvas {
+    fn drawn(&self, [above, below]: &[Vec<(Type, f64, String)>; 2], width_mm: Option<f64>) -> String {
         let width_px = self.width_px();
         let mut canvas = Canvas::new(width_px + 2.0 * MARGIN_PX);
-        let mut y = canvas.paragraph((MARGIN_PX, 14.0), &self.title, TITLE, width_px);
-        if let Some(subtitle) = &self.subtitle {
-            y = canvas.paragraph((MARGIN_PX, y + 3.0), subtitle, TEXT, width_px);
+        let mut y = 14.0;
+        for (set, gap_px, words) in above {
+            y = canvas.paragraph((MARGIN_PX, y + gap_px), words, *set, width_px);
         }
-        y = between(&mut canvas, y + 8.0);
-        y = self.rows(&mut canvas, y);
+        y = self.rows(&mut canvas, y + 8.0);
         y = self.legend(&mut canvas, y + 2.0);
-        let caption = if self.has_few() && !self.caption.is_empty() {
-            [&self.caption, HOLLOW].join(" ")
-        } else {
-            self.caption.clone()
-        };
-        y = canvas.paragraph((MARGIN_PX, y + 3.0), &caption, TEXT, width_px);
-        if !self.notes.1.is_empty() {
-            y = canvas.paragraph((MARGIN_PX, y + 5.0), self.notes.0, HEADING, width_px);
+        for (set, gap_px, words) in below {
+            y = canvas.paragraph((MARGIN_PX, y + gap_px), words, *set, width_px);
         }
-        for line in &self.notes.1 {
-            y = canvas.paragraph((MARGIN_PX, y + 2.0), line, TEXT, width_px);
-        }
-        canvas.end_at(y);
-        canvas
+        // What a screen reader says: the data, and what the marks are.
+        let description = [self.subtitle.as_deref().unwrap_or_default(), &self.caption].join(" ");
+        canvas.document(y, width_mm, &self.title, description.trim())
     }
 
     /// The numbers of the series: one row per value.
@@ -252,15 +193,12 @@ impl Figure {
             .column("panel", |(plot, ..)| plot.heading.as_str())
             .column("row", |(plot, _, value)| plot.name_of(value).map_or("", |name| name.words.as_str()))
             .column("series", |(_, series, _)| series.name.as_str())
-            .column("label", |(.., value)| value.label.as_str())
             .column("x_quantity", |(plot, ..)| plot.x.label.as_str())
             .column("x", |(.., value)| value.x)
-            .column("x_low", |(_, series, value)| series.ends_of(value, true).map(|ends| ends.0))
-            .column("x_high", |(_, series, value)| series.ends_of(value, true).map(|ends| ends.1))
+            .column("x_low", |(_, series, value)| series.ends_of(value).map(|ends| ends.0))
+            .column("x_high", |(_, series, value)| series.ends_of(value).map(|ends| ends.1))
             .column("y_quantity", |(plot, ..)| plot.y.label.as_str())
             .column("y", |(plot, _, value)| (plot.is_polar || plot.y.names.is_empty()).then_some(value.y))
-            .column("y_low", |(_, series, value)| series.ends_of(value, false).map(|ends| ends.0))
-            .column("y_high", |(_, series, value)| series.ends_of(value, false).map(|ends| ends.1))
             .build()
     }
 
@@ -295,7 +233,11 @@ impl Figure {
     fn shares(&self, axis: fn(&Plot) -> &PlotAxis) -> bool {
         let mut shown = self.plots.iter().filter(|plot| !plot.is_blank());
         let first = shown.next();
-        self.plots.len() > 1 && first.is_some_and(|first| shown.all(|plot| axis(plot).is_like(axis(first))))
+        self.plots.len() > 1
+            && first.is_some_and(|first| {
+                let like = |plot: &Plot| (&axis(plot).label, axis(plot).ends) == (&axis(first).label, axis(first).ends);
+                shown.all(like)
+            })
     }
 
     /// Draws all plots below `top`, in rows; returns the y below.
@@ -382,7 +324,7 @@ impl Figure {
     /// Draws samples and names of what is drawn, in two columns read downwards (one if a name is too long for half the
     /// width); returns the y below.
     fn legend(&self, canvas: &mut Canvas, top: f64) -> f64 {
-        let shown = || self.plots.iter().flat_map(|plot| plot.series.iter().filter(|series| plot.shows(series)));
+        let shown = || self.plots.iter().flat_map(|plot| plot.series.iter().filter(|series| Plot::shows(series)));
         let series = self.names().into_iter().filter_map(|name| {
             let series = shown().find(|series| series.name == name)?;
             Some((name, Entry::Series(series, self.look(series))))
@@ -442,10 +384,9 @@ impl Plot {
         self.heading.is_empty() && self.cells.is_none() && self.rules.is_empty() && self.series.is_empty()
     }
 
-    /// Whether the axes can show a value of the series, or the upper end of its interval.
-    pub(super) fn shows(&self, series: &Series) -> bool {
-        let is_shown = |v: &Value| self.x.scale.shows(v.x) && self.y.scale.shows(v.y);
-        series.values.iter().any(|value| is_shown(value) || value.interval.is_some())
+    /// Whether the axes can show a value of the series.
+    fn shows(series: &Series) -> bool {
+        series.values.iter().any(Value::is_shown)
     }
 
     /// Space left and right of the frame, px.
@@ -463,16 +404,12 @@ impl Plot {
 
     /// The axes within these ends; `None` if there is nothing to show.
     fn axes(&self, across: (f64, f64), down: (f64, f64), centre: Option<Position>) -> Option<Axes> {
-        let shown = || {
-            let is_shown = |v: &&Value| self.x.scale.shows(v.x) && self.y.scale.shows(v.y);
-            self.series.iter().flat_map(|series| &series.values).filter(is_shown)
-        };
-        if !self.is_polar && !self.series.is_empty() && !self.series.iter().any(|series| self.shows(series)) {
-            return None;
-        }
-        let x = self.x.place(shown().map(|v| v.x), across)?;
-        let y = self.y.place(shown().map(|v| v.y), (down.1, down.0))?;
-        Some(Axes { x, y, centre })
+        let is_empty = !self.series.is_empty() && !self.series.iter().any(Plot::shows);
+        (self.is_polar || !is_empty).then(|| Axes {
+            x: self.x.place(across),
+            y: self.y.place((down.1, down.0)),
+            centre,
+        })
     }
 
     /// Draws the plot in a frame (across, down): axes with their numbers (below, at the left), content.
@@ -516,30 +453,19 @@ impl Plot {
         let mut taken = Vec::new();
         self.rules.iter().for_each(|rule| rule.name_at_end(canvas, axes, &mut taken));
         for series in &self.series {
-            series.markers(canvas, axes, &look(series), &|value| self.tip(series, value), &mut taken);
+            series.markers(canvas, axes, &look(series), &|value| self.tip(series, value));
         }
     }
 
     /// `FSM, collision; 2: constant acceleration; F1 0.86 [0.84 0.88]; n = 285`.
     fn tip(&self, series: &Series, value: &Value) -> String {
-        let along = |axis: &PlotAxis, at: f64, ends: Option<(f64, f64)>| {
-            let interval = ends.map(|(low, high)| format!(" [{} {}]", number(low), number(high))).unwrap_or_default();
-            let is_named = !axis.names.is_empty() || axis.label.is_empty();
-            if is_named { String::new() } else { format!("{} {}{interval}", axis.label, number(at)) }
-        };
+        let interval = series.ends_of(value);
+        let interval = interval.map(|(low, high)| format!(" [{} {}]", plain(low, 3), plain(high, 3)));
+        // The axis with numbers: the radius of a polar plot, whose rings have names too.
+        let (axis, at) = if self.is_polar { (&self.y, value.y) } else { (&self.x, value.x) };
+        let number = format!("{} {}{}", axis.label, plain(at, 3), interval.unwrap_or_default());
         let (row, note) = self.name_of(value).map_or(("", ""), |name| (&name.words, &name.note));
-        // In a polar plot the radius has names, and a quantity.
-        let y = PlotAxis { names: Vec::new(), ..self.y.clone() };
-        let y = if self.is_polar { &y } else { &self.y };
-        let words = [
-            self.heading.as_str(),
-            row,
-            &series.name,
-            &value.label,
-            &along(&self.x, value.x, series.ends_of(value, true)),
-            &along(y, value.y, series.ends_of(value, false)),
-            note,
-        ];
+        let words = [self.heading.as_str(), row, &series.name, &number, note];
         words.into_iter().filter(|word| !word.is_empty()).collect::<Vec<_>>().join("; ")
     }
 

@@ -5,7 +5,7 @@
 
 use std::fmt::{Display, Write};
 
-use lanesweep_support::plain_text::acts;
+use lanesweep_support::plain_text::escape_markup;
 
 pub(crate) const INK: &str = "#1a1a1a";
 pub(crate) const GREY: &str = "#5f5f5f";
@@ -114,43 +114,32 @@ pub(crate) enum Anchor {
 #[derive(Debug)]
 pub(crate) struct Canvas {
     width_px: f64,
-    height_px: f64,
-    /// Width on paper; `None`: 1 px is 1 px.
-    width_mm: Option<f64>,
     body: String,
     depth: usize,
 }
 
 impl Canvas {
     pub(super) fn new(width_px: f64) -> Self {
-        Canvas { width_px, height_px: 0.0, width_mm: None, body: String::new(), depth: 1 }
+        Canvas { width_px, body: String::new(), depth: 1 }
     }
 
-    /// Ends the page a little below `bottom`.
-    pub(super) fn end_at(&mut self, bottom: f64) {
-        self.height_px = (bottom + 20.0).ceil();
-    }
-
-    /// The same with a width on paper.
-    pub(super) fn in_mm(self, width_mm: f64) -> Self {
-        Canvas { width_mm: Some(width_mm), ..self }
-    }
-
-    /// The finished document, with what a screen reader says of it.
-    pub(super) fn document(self, title: &str, description: &str) -> String {
-        let (width, height) = (Number(self.width_px), Number(self.height_px));
-        let size = match self.width_mm {
+    /// The document, ended a little below `bottom`, with what a screen reader says of it. With a width on paper it has a size
+    /// there; else 1 px is 1 px.
+    pub(super) fn document(self, bottom: f64, width_mm: Option<f64>, title: &str, description: &str) -> String {
+        let height_px = (bottom + 20.0).ceil();
+        let (width, height) = (Number(self.width_px), Number(height_px));
+        let size = match width_mm {
             None => format!("width=\"{width}\" height=\"{height}\""),
             Some(mm) => {
-                let height_mm = Number(mm * self.height_px / self.width_px);
+                let height_mm = Number(mm * height_px / self.width_px);
                 format!("width=\"{}mm\" height=\"{height_mm}mm\" viewBox=\"0 0 {width} {height}\"", Number(mm))
             }
         };
         format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" {size} font-family=\"{FONTS}\" fill=\"{INK}\">\n  \
              <title>{}</title>\n  <desc>{}</desc>\n  <rect width=\"100%\" height=\"100%\" fill=\"{WHITE}\" />\n{}</svg>\n",
-            escaped(title),
-            escaped(description),
+            escape_markup(title),
+            escape_markup(description),
             self.body
         )
     }
@@ -205,7 +194,7 @@ impl Canvas {
         attribute(&mut text, "text-anchor", anchor);
         attribute(&mut text, "font-weight", set.bold.then_some("bold"));
         attribute(&mut text, "fill", (set.colour != INK).then_some(set.colour));
-        self.element(&format!("{text}>{}</text>", escaped(line)));
+        self.element(&format!("{text}>{}</text>", escape_markup(line)));
     }
 
     /// Draws a wrapped text with its top at `y`; returns the y below it.
@@ -226,7 +215,7 @@ impl Canvas {
         self.element(&format!("<g {attributes}>"));
         self.depth += 1;
         if !tip.is_empty() {
-            self.element(&format!("<title>{}</title>", escaped(tip)));
+            self.element(&format!("<title>{}</title>", escape_markup(tip)));
         }
         draw(self);
         self.depth -= 1;
@@ -250,23 +239,4 @@ impl Display for Number {
         let text = text.trim_end_matches('0').trim_end_matches('.');
         f.write_str(if text == "-0" { "0" } else { text })
     }
-}
-
-/// Text escaped for XML content, without the characters that XML 1.0 never allows, and without those that reverse or
-/// hide text.
-fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out += "&amp;",
-            '<' => out += "&lt;",
-            '>' => out += "&gt;",
-            '"' => out += "&quot;",
-            '\'' => out += "&apos;",
-            '\u{FFFE}' | '\u{FFFF}' => out.push('\u{FFFD}'),
-            c if acts(c) => out.push('\u{FFFD}'),
-            c => out.push(c),
-        }
-    }
-    out
 }

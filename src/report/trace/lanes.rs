@@ -1,6 +1,6 @@
 //! Lanes step by step, as `simulate` shows them: figure, table, document and summaries.
 
-use super::{TraceFigure, TracePanels, TraceSeries, table};
+use super::{TraceFigure, TraceSeries, table};
 use crate::lanes::{outcome_record, with_outcomes};
 use crate::records::{self, PROGRAM, record};
 use lanesweep_engine::{EndReason, NO_STEP, Outcome, Trace};
@@ -18,29 +18,19 @@ impl TraceReport<'_> {
     /// The lanes on one sheet, up to a time, s, or 2 s after the last change.
     pub fn figure(&self, until_s: Option<f64>) -> TraceFigure<'_> {
         let (lanes, first) = (&self.0.lanes, &self.0.lanes[0]);
-        let of_all = |part: fn(&TracedLane) -> &str| {
-            Some(part(first)).filter(|one| lanes.iter().all(|lane| part(lane) == *one)).map(str::to_owned)
-        };
-        let category = of_all(|lane| lane.trace.category.label()).unwrap_or_else(|| format!("{} lanes", lanes.len()));
+        let category = first.trace.category.label();
         let title = match lanes.len() {
+            // The lanes of one case, by their drivers.
+            _ if !first.key.contains('/') => format!("{category}, initial gap {} m", value(first.trace.initial_gap_m)),
             1 => format!("{category}: {}", first.key),
-            _ if !first.key.contains('/') => {
-                format!("{category}, initial gap {} m", value(first.trace.initial_gap_m))
-            }
-            _ => {
-                let scenario = of_all(|lane| lane.key.rsplitn(4, '/').last().unwrap_or_default());
-                let headway = of_all(|lane| lane.key.rsplit('/').nth(1).unwrap_or_default());
-                let headway = headway.map(|headway| format!("headway {headway}"));
-                let shared = scenario.into_iter().chain(headway).collect::<Vec<_>>().join(", ");
-                if shared.is_empty() { category } else { format!("{category}: {shared}") }
-            }
+            many => format!("{category}: {} and {} more", first.key, many - 1),
         };
         let synthetic =
             if self.0.is_synthetic && !self.0.origin.contains("SYNTHETIC") { "SYNTHETIC DATA; " } else { "" };
         let series =
             self.0.lanes.iter().map(|lane| TraceSeries { name: lane.name.clone(), trace: &lane.trace }).collect();
         let subtitle = Some(format!("{synthetic}{}", self.0.origin));
-        TraceFigure { title, subtitle, series, until_s, panels: TracePanels::All }
+        TraceFigure { title, subtitle, series, until_s }
     }
 
     /// Every step as CSV.

@@ -7,12 +7,13 @@ mod lanes;
 mod panels;
 mod positions;
 
-use super::plot::{Anchor, Canvas, Ends, Figure, INK, Look, Plot, TICK, Type, number, set};
+use super::plot::{Figure, Look, Plot, Rule};
 pub use lanes::TraceReport;
 use lanesweep_engine::{StepMark, Trace, TracedStep};
+use lanesweep_support::readable::plain;
 use lanesweep_support::table::Table;
-use panels::{Shown, mark_look};
-pub use panels::{TracePanels, TraceSeries};
+use panels::Shown;
+pub use panels::TraceSeries;
 
 /// Lanes of one case, or of variants of a case, on one sheet.
 #[derive(Debug, Clone)]
@@ -25,17 +26,7 @@ pub struct TraceFigure<'a> {
     pub series: Vec<TraceSeries<'a>>,
     /// Last time shown, s; `None`: 2 s after the last change.
     pub until_s: Option<f64>,
-    /// The panels.
-    pub panels: TracePanels,
 }
-
-const MARGIN_PX: f64 = 14.0;
-const HINT: Type = TICK;
-const CELL: Type = set(13, false, INK);
-/// Width of a column of the table of marks, and of the line sample before a name.
-const CELL_PX: f64 = 76.0;
-const SAMPLE_PX: f64 = 38.0;
-const MARK_PX: f64 = 5.0;
 
 impl TraceFigure<'_> {
     /// Width of the lanes, m.
@@ -54,49 +45,33 @@ impl TraceFigure<'_> {
             return Figure { title, subtitle, caption, ..Figure::default() }.svg();
         }
         let shown = Shown::of(&self.series, self.until_s);
-        let (columns, plots) = shown.panels(self.panels);
+        let (columns, mut plots) = shown.panels();
         let caption = self.notes(&shown, &plots).join(" ");
-        let figure = Figure { title, subtitle, plots, columns, is_wide: columns > 1, caption, ..Figure::default() };
-        figure.svg_with(|canvas, top| self.table(canvas, &shown.looks, top) + 4.0)
+        plots.iter_mut().take(1).for_each(|plot| plot.rules.extend(self.legend(&shown.looks)));
+        Figure { title, subtitle, plots, columns, is_wide: columns > 1, caption, ..Figure::default() }.svg()
     }
 
-    /// Draws names, marks and worst values of the series; returns the y below.
-    fn table(&self, canvas: &mut Canvas, looks: &[Look], top: f64) -> f64 {
-        let columns =
-            [StepMark::Reaction.label(), StepMark::Braking.label(), StepMark::Contact.label(), "min TTC", "max BTN"];
-        let name_left = MARGIN_PX + SAMPLE_PX + 8.0;
-        let longest_px = self.series.iter().map(|s| CELL.text_px(&s.name)).fold(0.0, f64::max);
-        let max_px = 540.0 - MARGIN_PX - CELL_PX * columns.len() as f64;
-        let at = |column: usize| max_px.min(name_left + longest_px + 16.0) + CELL_PX * column as f64;
-        let mut y = top + CELL.line_px();
-        for (column, head) in columns.iter().enumerate() {
-            canvas.text((at(column), top + f64::from(CELL.size_px)), head, HINT, Anchor::Start);
-        }
-        for (series, look) in self.series.iter().zip(looks) {
-            let (baseline, middle) = (y + f64::from(CELL.size_px), y + CELL.line_px() / 2.0);
-            let sample = vec![(MARGIN_PX, middle), (MARGIN_PX + SAMPLE_PX, middle)];
-            canvas.group("class=\"legend\"", "", |canvas| canvas.path(&[sample], false, look.paint()));
-            let below = canvas.paragraph((name_left, y), &series.name, CELL, at(0) - name_left - 8.0);
-            for (column, mark) in StepMark::ALL.into_iter().enumerate() {
-                let Some(step) = series.trace.step_of(mark) else {
-                    canvas.text((at(column), baseline), "never", HINT, Anchor::Start);
-                    continue;
-                };
-                mark_look(mark, look).marker(canvas, (at(column) + MARK_PX, middle));
-                let time = format!("{} s", thousandths(series.trace.time_s(step)));
-                canvas.text((at(column) + 2.0 * MARK_PX + 5.0, baseline), &time, CELL, Anchor::Start);
+    /// Names, marks and worst values of the series, for the legend.
+    fn legend(&self, looks: &[Look]) -> impl Iterator<Item = Rule> {
+        self.series.iter().zip(looks).map(|(TraceSeries { name, trace }, look)| {
+            let mark = |mark: StepMark| match trace.step_of(mark) {
+                Some(step) => format!("{}\u{a0}{}\u{a0}s", mark.label(), thousandths(trace.time_s(step))),
+                None => format!("{}\u{a0}never", mark.label()),
+            };
+            let ttc = trace.outcome.approach_ttc().map_or("–".to_owned(), |ttc_s| format!("{} s", plain(ttc_s, 3)));
+            let marks = StepMark::ALL.map(mark).join(", ");
+            Rule {
+                name: format!("{name}: {marks}, min TTC {ttc}, max BTN {}", plain(trace.outcome.max_btn, 3)),
+                colour: look.colour,
+                width_px: look.line_px,
+                dash: look.dash,
+                ..Rule::default()
             }
-            let outcome = &series.trace.outcome;
-            let ttc = outcome.approach_ttc().map_or_else(|| "–".to_owned(), |ttc_s| worst(ttc_s, " s"));
-            canvas.text((at(3), baseline), &ttc, CELL, Anchor::Start);
-            canvas.text((at(4), baseline), &worst(outcome.max_btn, ""), CELL, Anchor::Start);
-            y = below.max(y + CELL.line_px()) + 3.0;
-        }
-        y
+        })
     }
 
     fn notes(&self, shown: &Shown, plots: &[Plot]) -> Vec<String> {
-        let mut notes = Vec::new();
+        let mut notes = vec!["Ring: reaction; triangle: braking; cross: contact.".to_owned()];
         if shown.has_unjudged() {
             notes.push("Thin gap, TTC, BTN: the criteria ignore the vehicle there.".to_owned());
         }
@@ -106,20 +81,21 @@ impl TraceFigure<'_> {
         if self.series.iter().any(|s| s.trace.coasting_mps2 > 0.0) {
             notes.push("CCHDM's coasting after its reaction is no braking.".to_owned());
         }
-        let is_cut = |plot: &Plot| {
-            let Ends::Exactly(_, top) = plot.y.ends else { return false };
-            plot.series.iter().flat_map(|series| &series.values).any(|value| value.y >= top)
-        };
+        let is_cut =
+            |plot: &Plot| plot.series.iter().flat_map(|series| &series.values).any(|value| value.y >= plot.y.ends.1);
         if plots.iter().any(is_cut) {
-            notes.push("A curve that ends at the top edge goes on above it.".to_owned());
+            notes.push("A curve along the top edge is above it.".to_owned());
         }
-        if self.panels != TracePanels::Course {
-            notes.push(format!("Long dashes: edges of a lane {} m wide.", thousandths(self.lane_width_m())));
-        }
+        notes.push(format!("Long dashes: edges of a lane {} m wide.", thousandths(self.lane_width_m())));
         let end_s = self.series.iter().filter_map(|s| Some(s.trace.steps.last()?.time_s)).fold(0.0, f64::max);
         if end_s > shown.until_s {
             let (until, end) = (thousandths(shown.until_s), thousandths(end_s));
             notes.push(format!("The lanes go on after {until} s, the longest to {end} s."));
+            if self.until_s.is_none() {
+                notes.push(
+                    "Marks, changes of an ego's speed, and worst gap, TTC and BTN (to 5 %) come before.".to_owned(),
+                );
+            }
         }
         notes
     }
@@ -127,10 +103,6 @@ impl TraceFigure<'_> {
 
 fn thousandths(value: f64) -> String {
     ((value * 1e3).round() / 1e3).to_string()
-}
-
-fn worst(value: f64, unit: &str) -> String {
-    if value.is_finite() { format!("{}{unit}", number(value)) } else { "∞".to_owned() }
 }
 
 const VEHICLES: [&str; 2] = ["other", "ahead"];

@@ -3,6 +3,7 @@
 use super::super::plot::{GREY, Height, INK, Look, Mark, Plot, PlotAxis, Rule, Series, Symbol, Value, plain_end};
 use super::thousandths;
 use lanesweep_engine::{StepMark, Trace, TracedStep, TracedVehicle};
+use lanesweep_model::scenario::{GAP_ERROR_M, KMH};
 
 /// One lane on the sheet.
 #[derive(Debug, Clone)]
@@ -13,8 +14,12 @@ pub struct TraceSeries<'a> {
     pub trace: &'a Trace,
 }
 
-/// Time shown after the last change, s.
+/// Time shown after the last decisive event, s.
 const REST_S: f64 = 2.0;
+/// A value this near to its worst counts as the worst, relative: near a steady state the last digits take a minute.
+const NEAR: f64 = 0.05;
+/// Smaller changes of an ego's speed decide nothing, m/s.
+const SPEED_CHANGE_MPS: f64 = 1.0 / KMH;
 /// TTC and BTN are shown up to these multiples of their thresholds.
 const TTC_SHOWN: f64 = 10.0;
 const BTN_SHOWN: f64 = 2.5;
@@ -36,7 +41,7 @@ impl From<Curve> for Series {
 }
 
 /// A mark in the colour of its series; shapes distinguish marks.
-pub(super) fn mark_look(mark: StepMark, look: &Look) -> Look {
+fn mark_look(mark: StepMark, look: &Look) -> Look {
     let symbol = match mark {
         StepMark::Reaction => Symbol::Ring,
         StepMark::Braking => Symbol::Polygon(3, 0.5),
@@ -45,41 +50,9 @@ pub(super) fn mark_look(mark: StepMark, look: &Look) -> Look {
     Look { symbol, marker_px: 5.0, ..*look }
 }
 
-/// Dashes of the line through all panels at a mark.
-pub(super) fn mark_dash(mark: StepMark) -> &'static str {
-    match mark {
-        StepMark::Reaction => "2,3",
-        StepMark::Braking => "7,3",
-        StepMark::Contact => "",
-    }
-}
-
-/// Which panels of a case are drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TracePanels {
-    /// All.
-    All,
-    /// Speed, acceleration, gap: what happens.
-    Course,
-    /// TTC, BTN, fuzzy surrogates, lateral position: how it is judged.
-    Measures,
-    /// Speed and lateral position of the other vehicles: what is given.
-    Motion,
-}
-
-/// An acceleration that turns more often than this is drawn thin.
-const MAX_TURNS: usize = 12;
-
 /// A line through a panel.
 fn rule(ends: [(f64, f64); 2], colour: &'static str, width_px: f64, dash: &'static str) -> Rule {
-    Rule {
-        runs: vec![ends.to_vec()],
-        colour,
-        width_px,
-        dash,
-        attributes: "class=\"level\"".to_owned(),
-        ..Rule::default()
-    }
+    Rule { runs: vec![ends.to_vec()], colour, width_px, dash, ..Rule::default() }
 }
 
 /// Data common to all panels: the series up to a time.
@@ -92,17 +65,17 @@ pub(super) struct Shown<'a> {
 }
 
 impl<'a> Shown<'a> {
-    /// Up to a given time, or to the last change: lanes may continue long after their last event.
+    /// Up to a given time, or to the last event that decides: lanes may continue long after it.
     pub(super) fn of(series: &'a [TraceSeries<'a>], until_s: Option<f64>) -> Self {
         let end_s = series.iter().filter_map(|s| Some(s.trace.steps.last()?.time_s)).fold(0.0, f64::max);
-        let last_s = series.iter().map(|s| s.trace.last_change_s()).fold(0.0, f64::max) + REST_S;
+        let last_s = series.iter().map(|s| decisive_s(s.trace)).fold(0.0, f64::max) + REST_S;
         let until_s = until_s.unwrap_or(if last_s < 0.8 * end_s { last_s } else { end_s });
         let looks = (0..series.len()).map(|k| Look::of(k, series.len())).collect();
         Shown { series, looks, until_s: until_s.clamp(0.0, end_s) }
     }
 
     /// The panels row by row, and how many are in a row: one, or one per other vehicle where there are two.
-    pub(super) fn panels(&self, which: TracePanels) -> (usize, Vec<Plot>) {
+    pub(super) fn panels(&self) -> (usize, Vec<Plot>) {
         let vehicles = self.series.iter().map(|s| s.trace.vehicles).max().unwrap_or(1);
         let of = |vehicle: usize| {
             let name = match (vehicles, vehicle) {
@@ -119,20 +92,9 @@ impl<'a> Shown<'a> {
                 self.lateral(vehicle),
             ]
         };
-        let own = [self.speed(vehicles), self.acceleration()];
+        let mut shown = vec![self.speed(vehicles), self.acceleration()];
         let others: Vec<[Plot; 6]> = (0..vehicles).map(of).collect();
-        let judged = (0..6).flat_map(|at| others.iter().map(move |plots| plots[at].clone()));
-        let all: Vec<Plot> = own.into_iter().chain(judged).collect();
-        let course = 2 + vehicles;
-        let mut shown = match which {
-            TracePanels::All => all,
-            TracePanels::Course => all[..course].to_vec(),
-            TracePanels::Measures => all[course..].to_vec(),
-            TracePanels::Motion => {
-                let speeds = (0..vehicles).map(|vehicle| self.speed_of(vehicle));
-                speeds.chain(others.iter().map(|plots| plots[5].clone())).collect()
-            }
-        };
+        shown.extend((0..6).flat_map(|at| others.iter().map(move |plots| plots[at].clone())));
         // The lines through all panels have their names in the first.
         let named =
             self.mark_lines().into_iter().map(|(mark, time_s)| format!("{} {} s", mark.label(), thousandths(time_s)));
@@ -165,15 +127,15 @@ impl<'a> Shown<'a> {
     ) -> Plot {
         // A lane of one step needs an axis too.
         let end_s = if self.until_s > 0.0 { self.until_s } else { 1.0 };
-        let through = self.mark_lines().into_iter().map(|(mark, time_s)| {
-            let attributes = format!("class=\"mark-line {}\"", mark.label());
-            Rule { attributes, ..rule([(time_s, ends.0), (time_s, ends.1)], INK, 1.0, mark_dash(mark)) }
-        });
+        let through = self
+            .mark_lines()
+            .into_iter()
+            .map(|(_, time_s)| rule([(time_s, ends.0), (time_s, ends.1)], INK, 1.0, "2,3"));
         Plot {
             heading: title.to_owned(),
             hint: hint.into(),
-            x: PlotAxis::exactly("Time (s)", 0.0, end_s),
-            y: PlotAxis::exactly("", ends.0, ends.1),
+            x: PlotAxis::new("Time (s)", 0.0, end_s),
+            y: PlotAxis::new("", ends.0, ends.1),
             rules: through.chain(levels).collect(),
             series,
             height: Height::Px(height_px),
@@ -209,26 +171,8 @@ impl<'a> Shown<'a> {
         self.panel("Speed (m/s)", hint, 92.0, ends, Vec::new(), with_marks(curves, marks))
     }
 
-    /// The speed of another vehicle alone.
-    fn speed_of(&self, vehicle: usize) -> Plot {
-        let courses = self.courses(vehicle, &|other| other.v_mps);
-        let speed = of_other(vehicle, &|other| other.v_mps, false);
-        let curves: Vec<Curve> =
-            courses.into_iter().flat_map(|(look, trace)| runs(look, self.steps(trace), &speed)).collect();
-        let name = if vehicle == 0 { "of the other vehicle" } else { "of the vehicle ahead of it" };
-        self.panel("Speed (m/s)", name, 92.0, around(values(&curves)), Vec::new(), with_marks(curves, Vec::new()))
-    }
-
     fn acceleration(&self) -> Plot {
-        let mut curves = self.curves(&|step| Some((step.a_ego_mps2, false)));
-        for curve in &mut curves {
-            let steps = curve.points.windows(2).map(|pair| pair[1].1 - pair[0].1).filter(|by| by.abs() > 1e-6);
-            let signs: Vec<bool> = steps.map(|by| by > 0.0).collect();
-            let is_chattering = signs.windows(2).filter(|pair| pair[0] != pair[1]).count() > MAX_TURNS;
-            if is_chattering {
-                curve.look.line_px = 0.6;
-            }
-        }
+        let curves = self.curves(&|step| Some((step.a_ego_mps2, false)));
         let ends = around(values(&curves).chain([0.0, -1.0]));
         let series = with_marks(curves, self.marks(&StepMark::ALL, None, &|step| Some(step.a_ego_mps2)));
         let zero = self.level(0.0, GREY, 1.1, "");
@@ -262,11 +206,13 @@ impl<'a> Shown<'a> {
     }
 
     fn measure(&self, title: &str, label: String, top: f64, threshold: f64, curves: Vec<Curve>) -> Plot {
-        let is_beyond = |curve: &Curve| curve.points.iter().all(|point| point.1 > top);
-        let hint = if curves.iter().any(is_beyond) { "a curve not shown is above" } else { "" };
-        let series = curves.into_iter().flat_map(|curve| below(curve, top)).map(Series::from).collect();
+        let below = |curve: Curve| {
+            let points = curve.points.into_iter().map(|(time_s, value)| (time_s, value.min(top)));
+            Curve { points: points.collect(), ..curve }
+        };
+        let series = curves.into_iter().map(below).map(Series::from).collect();
         let level = Rule { label, ..self.level(threshold, INK, 1.4, "2,3") };
-        self.panel(title, hint, 84.0, (-0.04 * top, top), vec![level], series)
+        self.panel(title, "", 84.0, (-0.04 * top, top), vec![level], series)
     }
 
     fn surrogate(&self, title: &str, hint: &str, vehicle: usize, value: &dyn Fn(&TracedVehicle) -> f64) -> Plot {
@@ -354,13 +300,37 @@ impl<'a> Shown<'a> {
             for &mark in which {
                 let step = of.trace.step_of(mark).and_then(|step| self.steps(of.trace).get(step as usize));
                 let Some((step, value)) = step.and_then(|step| Some((step, value(step)?))) else { continue };
-                let attributes = format!("class=\"mark {}\" data-t=\"{}\"", mark.label(), step.time_s);
-                let series = Series::new("", &[Mark::Points], [(step.time_s, value)]).with_look(mark_look(mark, look));
-                marks.push(Series { attributes, ..series });
+                let series = Series::new("", &[Mark::Points], [(step.time_s, value)]);
+                marks.push(series.with_look(mark_look(mark, look)));
             }
         }
         marks
     }
+}
+
+/// The last time at which a driver decides or is decided, s: marks, changes of its speed, and where gap, TTC and BTN come
+/// near their worst. A TTC or BTN that is never shown decides nothing.
+fn decisive_s(trace: &Trace) -> f64 {
+    let marks = StepMark::ALL.into_iter().filter_map(|mark| trace.step_of(mark)).map(|step| trace.time_s(step));
+    let last_mps = trace.steps.last().map_or(0.0, |step| step.v_ego_mps);
+    let changes = |step: &&TracedStep| (step.v_ego_mps - last_mps).abs() > SPEED_CHANGE_MPS;
+    let braked = trace.steps.iter().rfind(changes).map(|step| step.time_s);
+    let smallest = |step: &TracedStep, of: fn(&TracedVehicle) -> f64| {
+        let judged = step.others[..trace.vehicles].iter().filter(|other| other.is_judged);
+        judged.map(of).fold(f64::INFINITY, f64::min)
+    };
+    // The first time at which a value is as near to its worst as this; none if the worst is above a limit.
+    let first = |of: fn(&TracedVehicle) -> f64, limit: f64, near: &dyn Fn(f64) -> f64| {
+        let worst = trace.steps.iter().map(|step| smallest(step, of)).fold(f64::INFINITY, f64::min);
+        let is_near = |step: &&TracedStep| worst.is_finite() && worst <= limit && smallest(step, of) <= near(worst);
+        trace.steps.iter().find(is_near).map(|step| step.time_s)
+    };
+    let worst = [
+        first(|other| other.gap_m, f64::MAX, &|worst| worst + GAP_ERROR_M.max(worst * NEAR)),
+        first(|other| other.ttc_s, TTC_SHOWN * trace.ttc_threshold_s, &|worst| worst * (1.0 + NEAR)),
+        first(|other| -other.btn, -trace.btn_threshold / TTC_SHOWN, &|worst| worst * (1.0 - NEAR)),
+    ];
+    marks.chain(braked).chain(worst.into_iter().flatten()).fold(0.0, f64::max)
 }
 
 /// A value of another vehicle while it is present, as a thin curve or not.
@@ -412,31 +382,4 @@ fn around(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let room = (0.06 * (high - low)).max(1e-3 * low.abs().max(high.abs())).max(0.05);
     let (low, high) = (low - room, high + room);
     if low < high && low.is_finite() && high.is_finite() { (low, high) } else { (0.0, 1.0) }
-}
-
-/// The pieces of a curve that are not above `top`, with the points where it crosses it. Infinite values are above.
-fn below(curve: Curve, top: f64) -> Vec<Curve> {
-    let Curve { look, is_thin, points } = curve;
-    let mut pieces: Vec<Vec<(f64, f64)>> = vec![Vec::new()];
-    let crossing = |(t1, v1): (f64, f64), (t2, v2): (f64, f64)| {
-        // Towards infinity the curve crosses at the end of the step.
-        let share =
-            if v2.is_finite() && v1.is_finite() { (top - v1) / (v2 - v1) } else { f64::from(u8::from(v1 <= top)) };
-        (t1 + share * (t2 - t1), top)
-    };
-    let mut before: Option<(f64, f64)> = None;
-    for point in points {
-        match (before.map(|b| b.1 <= top), point.1 <= top) {
-            (Some(false), true) => pieces.push(vec![crossing(before.unwrap_or(point), point), point]),
-            (Some(true), false) => {
-                let end = crossing(before.unwrap_or(point), point);
-                pieces.last_mut().into_iter().for_each(|piece| piece.push(end));
-            }
-            (_, true) => pieces.last_mut().into_iter().for_each(|piece| piece.push(point)),
-            (_, false) => {}
-        }
-        before = Some(point);
-    }
-    pieces.retain(|piece| !piece.is_empty());
-    pieces.into_iter().map(|points| Curve { look, is_thin, points }).collect()
 }

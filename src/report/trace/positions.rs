@@ -4,8 +4,9 @@
 //! a lane knows; their gap is exact.
 
 use super::{TraceFigure, thousandths};
-use crate::plot::{Cells, Figure, FilledCell, GREY, Height, Plot, PlotAxis, Rule, number};
+use crate::plot::{Cells, Figure, FilledCell, GREY, Height, Plot, PlotAxis, Rule};
 use lanesweep_engine::{StepMark, Trace, TracedStep};
+use lanesweep_support::readable::plain;
 
 /// Names and colours of the vehicles.
 const VEHICLES: [(&str, &str); 3] =
@@ -40,7 +41,7 @@ fn decisive(trace: &Trace) -> Option<(&TracedStep, String)> {
         judged.map(|other| other.gap_m).fold(f64::INFINITY, f64::min)
     };
     let step = trace.steps.iter().min_by(|a, b| gap(a).total_cmp(&gap(b))).filter(|step| gap(step).is_finite())?;
-    Some((step, format!("smallest gap {} m, at {} s", number(gap(step)), thousandths(step.time_s))))
+    Some((step, format!("smallest gap {} m, at {} s", plain(gap(step), 3), thousandths(step.time_s))))
 }
 
 /// A plot's heading, and its vehicles.
@@ -50,7 +51,7 @@ impl TraceFigure<'_> {
     /// The vehicles at the start and, for every lane, at its contact or smallest gap; a row each.
     pub(crate) fn positions(&self) -> Figure {
         let start = self.series.first().and_then(|s| {
-            let name = format!("start: gap {} m", number(s.trace.initial_gap_m));
+            let name = format!("start: gap {} m", plain(s.trace.initial_gap_m, 3));
             Some((s.trace, s.trace.steps.first()?, name))
         });
         let later = self.series.iter().filter_map(|s| {
@@ -81,8 +82,8 @@ impl TraceFigure<'_> {
             let edges = Rule { runs: lane, colour: GREY, width_px: 1.0, dash: "14,6", ..Rule::default() };
             Plot {
                 heading,
-                x: PlotAxis::exactly("m ahead of the ego's middle", x.0, x.1),
-                y: PlotAxis::exactly("", y.0, y.1),
+                x: PlotAxis::new("m ahead of the ego's middle", x.0, x.1),
+                y: PlotAxis::new("", y.0, y.1),
                 cells: Some(Cells { cells, key }),
                 rules: vec![edges],
                 height: Height::OfWidth(((y.1 - y.0) / (x.1 - x.0)).clamp(0.07, 0.2)),
@@ -97,7 +98,7 @@ impl TraceFigure<'_> {
             caption: format!(
                 "{cut}Lateral positions in m, positive on the other vehicle's side. Long dashes: edges of a lane {} m \
                  wide.",
-                number(2.0 * half_lane_m)
+                plain(2.0 * half_lane_m, 3)
             ),
             ..Figure::default()
         }

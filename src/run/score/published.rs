@@ -73,7 +73,7 @@ pub fn published_lvd_f1(variant: &str, model: ModelId, criterion: Criterion) -> 
 }
 
 /// Misfit between a study and the published numbers.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Misfit {
     /// Number of failure rates of S that are published for cells of the study, at most 36.
     pub rates: usize,

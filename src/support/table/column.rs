@@ -4,6 +4,7 @@ use std::borrow::Cow;
 
 use serde_json::Value;
 
+use super::json_value;
 use crate::{Result, readable};
 
 /// Type of a column's values.
@@ -159,7 +160,7 @@ pub struct TableMetadata {
 pub struct Row {
     /// CSV: line of the file, counted from 1 with the header; Parquet: row, counted from 1.
     pub number: u64,
-    /// One per requested column.
+    /// One per requested column; NaN and infinity are null, because JSON lacks them.
     pub values: Vec<Value>,
 }
 
@@ -168,27 +169,40 @@ pub trait TableRows {
     /// Selects the columns, in the order in which rows have them. Call it before the first row.
     ///
     /// # Errors
-    /// [`Error::Input`](crate::Error::Input) if a selected column has an unsupported type, or its pages claim more than the
-    /// file can hold.
+    /// [`Error::Input`](crate::Error::Input) if a selected column has an unsupported type.
     fn want(&mut self, columns: &[usize]) -> Result<()>;
-
-    /// Returns the next row; `None` after the last.
-    ///
-    /// # Errors
-    /// [`Error::Io`](crate::Error::Io); [`Error::Input`](crate::Error::Input) for damaged data.
-    fn next_row(&mut self) -> Result<Option<Row>>;
 
     /// Advances to the next row, whose values [`TableRows::cell`] gives; false after the last.
     ///
     /// # Errors
-    /// As [`TableRows::next_row`].
+    /// [`Error::Io`](crate::Error::Io); [`Error::Input`](crate::Error::Input) for damaged data.
     fn step(&mut self) -> Result<bool>;
 
-    /// The value of a selected column, by its position in the selection, after [`TableRows::step`]; null for a list.
+    /// The number of the row, after [`TableRows::step`].
+    fn number(&self) -> u64;
+
+    /// The value of a selected column, by its position in the selection, after [`TableRows::step`].
     fn cell(&self, wanted: usize) -> Cell<'_>;
+
+    /// How many columns are selected.
+    fn width(&self) -> usize;
 
     /// Whether a selected column has lists.
     fn has_lists(&self) -> bool {
         false
+    }
+
+    /// Returns the next row; `None` after the last.
+    ///
+    /// # Errors
+    /// As [`TableRows::step`].
+    fn next_row(&mut self) -> Result<Option<Row>> {
+        let value = |cell: Cell| match cell {
+            Cell::Number(number) => Value::from(number),
+            cell => json_value(ColumnKind::Binary64, &cell),
+        };
+        Ok(self
+            .step()?
+            .then(|| Row { number: self.number(), values: (0..self.width()).map(|at| value(self.cell(at))).collect() }))
     }
 }

@@ -3,10 +3,8 @@
 use std::io::{BufReader, Cursor, Read};
 use std::path::{Path, PathBuf};
 
-use serde_json::Value;
-
 use super::writer::text_of_cell;
-use super::{Cell, Row, TableRows};
+use super::{Cell, TableRows};
 use crate::{Error, Place, Result, input_file};
 
 /// Maximum row length, bytes. A quote that is never closed makes the rest of the file one row.
@@ -118,13 +116,12 @@ impl TableRows for CsvRows {
         }
     }
 
-    fn next_row(&mut self) -> Result<Option<Row>> {
-        if !self.step()? {
-            return Ok(None);
-        }
-        let number = self.record.position().map_or(0, |position| position.line() + self.lines_off);
-        let value = |at| if let Cell::Text(text) = self.cell(at) { Value::from(text) } else { Value::Null };
-        Ok(Some(Row { number, values: (0..self.wanted.len()).map(value).collect() }))
+    fn number(&self) -> u64 {
+        self.record.position().map_or(0, |position| position.line() + self.lines_off)
+    }
+
+    fn width(&self) -> usize {
+        self.wanted.len()
     }
 }
 

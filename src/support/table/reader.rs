@@ -20,7 +20,7 @@ pub struct TableReader {
 }
 
 impl TableReader {
-    /// Opens a table and reads its column names; fields of records become columns named `record_field`.
+    /// Opens a table and reads its column names.
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Input`] if it is not a regular file with a table, or its header or footer is damaged.
