@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use super::is_parquet;
 use super::roles::{ColumnName, Role};
 use super::times::{FoundTime, time_of_text, unit_of_time};
-use crate::trajectory::csv_table::{CsvColumn, CsvFormat, CsvTable, FileChecksum};
+use crate::trajectory::csv_table::{CsvTable, FileChecksum};
 use crate::trajectory::number;
 use lanesweep_support::table::{Cell as TableCell, TableFormat, TableReader};
 use lanesweep_support::{Error, Place, Result};
@@ -133,7 +133,7 @@ impl Rows {
                 (reader.columns().to_vec(), RowSource::Parquet(Box::new(reader)))
             }
             false => {
-                let table = CsvTable::open(path, CsvFormat { name: "expected", header: "", delimiter: None })?;
+                let table = CsvTable::open(path, "")?;
                 (table.header().to_vec(), RowSource::Text(Box::new(table)))
             }
         };
@@ -220,7 +220,7 @@ impl SampleRow<'_> {
     fn cell(&self, role: Role) -> TableCell<'_> {
         let Some((at, _)) = self.columns.at[role as usize] else { return TableCell::Null };
         match &self.source {
-            Line::Text(table) => TableCell::Text(String::from_utf8_lossy(first_of(table.bytes(CsvColumn(at))))),
+            Line::Text(table) => TableCell::Text(String::from_utf8_lossy(first_of(table.bytes(at)))),
             Line::Parquet { reader, order, .. } => match reader.rows.cell(order[role as usize]) {
                 TableCell::Text(Cow::Borrowed(text)) => TableCell::Text(Cow::Borrowed(text.trim())),
                 cell => cell,
@@ -234,9 +234,9 @@ impl SampleRow<'_> {
         // Most values, without a text.
         if let (Line::Text(table), Some((at, _))) = (&self.source, self.columns.at[role as usize])
             && !table.has_decimal_commas()
-            && let Some(value) = number::short_decimal(table.bytes(CsvColumn(at)))
+            && let Some(value) = number::short_decimal(table.bytes(at))
         {
-            return si(value, &|| String::from_utf8_lossy(table.bytes(CsvColumn(at))).into_owned());
+            return si(value, &|| String::from_utf8_lossy(table.bytes(at)).into_owned());
         }
         match self.cell(role) {
             TableCell::Text(text) => self.number_of(&text, role),
