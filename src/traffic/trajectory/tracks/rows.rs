@@ -67,6 +67,23 @@ impl Columns {
         self.found_time.get()
     }
 
+    /// The columns with their roles, and those that are not used, in words.
+    pub(super) fn describe(&self) -> String {
+        let present = || Role::ALL.into_iter().filter(|role| self.has(*role));
+        let of = |role: Role| {
+            let (key, name) = (role.key(), self.name(role));
+            match self.found_time().filter(|_| role == Role::Time) {
+                Some(found) => format!("{key} = {name} ({found})"),
+                None if key == name => name.to_owned(),
+                None => format!("{key} = {name}"),
+            }
+        };
+        let used = present().map(of).collect::<Vec<_>>().join(", ");
+        let is_unused = |name: &&String| present().all(|role| self.name(role) != *name);
+        let unused: Vec<&str> = self.names.iter().filter(is_unused).map(String::as_str).collect();
+        if unused.is_empty() { used } else { format!("{used}; not used: {}", unused.join(", ")) }
+    }
+
     pub(super) fn has(&self, role: Role) -> bool {
         self.at[role as usize].is_some()
     }
