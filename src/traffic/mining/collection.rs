@@ -4,7 +4,7 @@
 use std::cmp::Reverse;
 use std::collections::{HashMap, HashSet};
 use std::hash::{DefaultHasher, Hash, Hasher};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -145,11 +145,11 @@ const UNPACKED: u64 = 8;
 
 /// Size of the files of a recording when they are unpacked, bytes.
 fn bytes(file: &InputFile) -> u64 {
-    let size = |path: &std::path::PathBuf| {
+    let size = |path: &PathBuf| {
         let bytes = std::fs::metadata(path).map_or(0, |file| file.len());
         if path.extension().is_some_and(|ending| ending == "gz") { UNPACKED * bytes } else { bytes }
     };
-    file.paths().iter().map(size).sum()
+    file.paths().into_iter().map(size).sum()
 }
 
 /// Reads and mines every recording of a folder, or of a file. `done` is called after each file, from any thread; its error

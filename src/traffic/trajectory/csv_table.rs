@@ -38,25 +38,14 @@ impl FileChecksum {
 }
 
 /// A column that the header has, by index.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct CsvColumn(pub usize);
-
-/// What a reader expects of a table.
-#[derive(Clone, Copy)]
-pub(super) struct CsvFormat {
-    /// Name of the format in messages.
-    pub name: &'static str,
-    /// Column names of the format, separated by commas: they are never reported as misspelt.
-    pub header: &'static str,
-    /// The delimiter; `None`: the one that the header has most of.
-    pub delimiter: Option<u8>,
-}
+pub(super) type CsvColumn = usize;
 
 /// An open table, positioned on one of its lines.
 pub(super) struct CsvTable {
     path: PathBuf,
     reader: Reader<HashingReader<Box<dyn Read + Send>>>,
-    format: CsvFormat,
+    /// Column names of the format, separated by commas: they are never reported as misspelt.
+    known: &'static str,
     header: Vec<String>,
     record: ByteRecord,
     line: u64,
@@ -73,18 +62,21 @@ const READ_AHEAD_BYTES: usize = 1 << 18;
 /// open quotation mark.
 const MAX_LINE_BYTES: u64 = 1 << 20;
 
+const SAVE_AS_UTF8: &str = "save the file as UTF-8 or export it again";
+
 impl CsvTable {
-    /// Opens a file and reads its header.
+    /// Opens a file and reads its header. The delimiter is the one that the header has most of; a comma in highD's format, whose
+    /// columns are `known`.
     ///
     /// # Errors
     /// If it cannot be read, is empty, or has no delimited header in UTF-8.
-    pub(super) fn open(path: &Path, format: CsvFormat) -> Result<Self> {
+    pub(super) fn open(path: &Path, known: &'static str) -> Result<Self> {
         let mut file = input_file::open_text(path)?;
         let mut start = Vec::new();
-        if format.delimiter != Some(b',') {
+        if known.is_empty() {
             file.by_ref().take(MAX_LINE_BYTES).read_to_end(&mut start).map_err(|e| Error::io(path, "read", e))?;
         }
-        let delimiter = format.delimiter.unwrap_or_else(|| delimiter_of(&start));
+        let delimiter = if known.is_empty() { delimiter_of(&start) } else { b',' };
         let decimal_commas = delimiter != b',' && has_decimal_commas(&start, delimiter);
         let inner: Box<dyn Read + Send> = Box::new(Cursor::new(start).chain(file));
         let file =
@@ -100,7 +92,7 @@ impl CsvTable {
         let mut table = CsvTable {
             path: path.to_path_buf(),
             reader,
-            format,
+            known,
             header: Vec::new(),
             record: ByteRecord::new(),
             line: 0,
@@ -150,18 +142,29 @@ impl CsvTable {
     /// If the header has none, or two; names the most similar column.
     pub(super) fn column(&self, name: &str) -> Result<CsvColumn> {
         self.optional_column(name)?.ok_or_else(|| {
-            let strange: Vec<&str> = self.strange_names().collect();
+            let strange: Vec<String> = self.strange_names().take(10).map(quoted).collect();
             let others = match strange.is_empty() {
                 true => String::new(),
-                false => format!("; the header has names that are not part of the format: {}", list(&strange)),
+                false => format!("; the header has names that are not part of the format: {}", strange.join(", ")),
             };
-            let problem = format!("the column is missing{others}");
             let help = match self.similar_name(name) {
                 Some(similar) => format!("rename the column `{similar}` to `{name}`, if that is what it holds"),
-                None => format!("add the column `{name}`, or export the file again in the {} format", self.format.name),
+                None => format!("add the column `{name}`, or export the file again in the highD format"),
             };
-            Error::input(Place::file(&self.path).row(1).column(name), problem, help)
+            Error::input(self.header_place().column(name), format!("the column is missing{others}"), help)
         })
+    }
+
+    /// The columns with these names.
+    ///
+    /// # Errors
+    /// As [`CsvTable::column`].
+    pub(super) fn columns<const N: usize>(&self, names: [&str; N]) -> Result<[CsvColumn; N]> {
+        let mut found = [0; N];
+        for (column, name) in found.iter_mut().zip(names) {
+            *column = self.column(name)?;
+        }
+        Ok(found)
     }
 
     /// The column with this name, if the header has it.
@@ -169,16 +172,14 @@ impl CsvTable {
     /// # Errors
     /// If the header has it twice.
     pub(super) fn optional_column(&self, name: &str) -> Result<Option<CsvColumn>> {
-        let mut found = self.header.iter().enumerate().filter(|(_, header)| *header == name);
-        let first = found.next().map(|(index, _)| CsvColumn(index));
-        if found.next().is_some() {
-            return Err(Error::input(
-                Place::file(&self.path).row(1).column(name),
-                "the header names this column twice",
-                "remove or rename one of the two",
-            ));
+        let mut found = (0..self.header.len()).filter(|index| self.header[*index] == name);
+        match (found.next(), found.next()) {
+            (first, None) => Ok(first),
+            _ => {
+                let place = self.header_place().column(name);
+                Err(Error::input(place, "the header names this column twice", "remove or rename one of the two"))
+            }
         }
-        Ok(first)
     }
 
     /// A header name that looks like a spelling of `name` (`lane_id` for `laneId`).
@@ -189,7 +190,7 @@ impl CsvTable {
     /// The bytes of a field.
     pub(super) fn bytes(&self, column: CsvColumn) -> &[u8] {
         // Every line has as many fields as the header, so the field exists.
-        let field = self.record.get(column.0).unwrap_or_default();
+        let field = self.record.get(column).unwrap_or_default();
         // Windows line ends leave this in the last field.
         field.strip_suffix(b"\r").unwrap_or(field)
     }
@@ -199,14 +200,8 @@ impl CsvTable {
     /// # Errors
     /// If it is not UTF-8.
     pub(super) fn text(&self, column: CsvColumn) -> Result<&str> {
-        match std::str::from_utf8(self.bytes(column)) {
-            Ok(text) => Ok(text.trim()),
-            Err(_) => Err(self.bad(
-                column,
-                format!("{} is not UTF-8 text", self.shown(column)),
-                "save the file as UTF-8 or export it again",
-            )),
-        }
+        let bad = |_| self.bad(column, format!("{} is not UTF-8 text", self.shown(column)), SAVE_AS_UTF8);
+        std::str::from_utf8(self.bytes(column)).map(str::trim).map_err(bad)
     }
 
     /// A field as a number between ±10¹², so that derived values stay finite.
@@ -250,7 +245,7 @@ impl CsvTable {
 
     /// The place of a field of the present line.
     pub(super) fn field(&self, column: CsvColumn) -> Place {
-        self.place().column(&self.header[column.0])
+        self.place().column(&self.header[column])
     }
 
     /// The present line.
@@ -261,6 +256,11 @@ impl CsvTable {
     /// The place of the whole file.
     pub(super) fn file_place(&self) -> Place {
         Place::file(&self.path)
+    }
+
+    /// The place of the header.
+    pub(super) fn header_place(&self) -> Place {
+        self.file_place().row(1)
     }
 
     /// A field as messages show it.
@@ -326,21 +326,21 @@ impl CsvTable {
 
     /// Header names that are not part of the format.
     fn strange_names(&self) -> impl Iterator<Item = &str> {
-        self.header.iter().map(String::as_str).filter(|name| !self.format.header.split(',').any(|known| known == *name))
+        self.header.iter().map(String::as_str).filter(|name| !self.known.split(',').any(|known| known == *name))
     }
 
     fn check_header(&self) -> Result<()> {
-        let is_other = |separator: &char| matches!(&self.header[..], [only] if only.contains(*separator));
+        let is_other = |separator: &&char| matches!(&self.header[..], [only] if only.contains(**separator));
         let (problem, help) = if self.record.iter().any(|field| field.contains(&0)) {
             let problem = "the header contains zero bytes; expected UTF-8 text with comma-separated column names";
             (problem.to_owned(), "save the file as UTF-8 (it may be UTF-16) or export it again")
-        } else if let Some(separator) = [';', '\t'].iter().find(|separator| is_other(separator)) {
+        } else if let Some(separator) = [';', '\t'].iter().find(is_other) {
             let help = "export the file with commas between the fields and points in the numbers";
             (format!("the fields are separated by {separator:?}; expected commas"), help)
         } else {
             return Ok(());
         };
-        Err(Error::input(Place::file(&self.path).row(1), problem, help))
+        Err(Error::input(self.header_place(), problem, help))
     }
 
     fn wrong_field_count(&mut self) -> Error {
@@ -364,32 +364,17 @@ impl CsvTable {
 
     fn not_a_number(&self, column: CsvColumn, expected: &str) -> Error {
         let field = self.bytes(column);
-        let (problem, help) = match std::str::from_utf8(field) {
-            _ if field.trim_ascii().is_empty() => {
-                (format!("the field is empty; expected {expected}"), "fill in the value")
-            }
-            Ok(_) => (format!("{} is not {expected}", self.shown(column)), "correct the value"),
-            Err(_) => {
-                (format!("{} is not {expected}", self.shown(column)), "save the file as UTF-8 or export it again")
-            }
-        };
-        self.bad(column, problem, help)
+        if field.trim_ascii().is_empty() {
+            return self.bad(column, format!("the field is empty; expected {expected}"), "fill in the value");
+        }
+        let help = if std::str::from_utf8(field).is_ok() { "correct the value" } else { SAVE_AS_UTF8 };
+        self.bad(column, format!("{} is not {expected}", self.shown(column)), help)
     }
 }
 
 /// A header field as a column name.
 fn header_name(field: &[u8]) -> String {
     String::from_utf8_lossy(field).trim().trim_start_matches('\u{feff}').to_owned()
-}
-
-/// The first few column names for a message, without control characters.
-fn list(names: &[&str]) -> String {
-    const SHOWN: usize = 10;
-    let mut shown: Vec<String> = names.iter().take(SHOWN).map(|name| quoted(name)).collect();
-    if names.len() > SHOWN {
-        shown.push(format!("{} more", names.len() - SHOWN));
-    }
-    shown.join(", ")
 }
 
 /// Text of a user's file in messages: quoted, without control characters, truncated.

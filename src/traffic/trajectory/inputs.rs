@@ -43,13 +43,11 @@ impl Inputs {
         match preset {
             Some(HIGHD) => return highd_inputs(path),
             Some(name) => return with(Preset::load(name)?),
+            None if !path.exists() => return highd_inputs(path),
             None => (),
         }
-        if !path.exists() {
-            return highd_inputs(path);
-        }
         if !path.is_dir() {
-            let is_whole = |of: Inputs| matches!(&of.files[..], [InputFile::Highd(files)] if files.is_complete());
+            let is_whole = |of: Inputs| of.files.iter().all(|file| file.paths().iter().all(|path| path.exists()));
             let has_meta = is_highd_name(path) && highd_inputs(path).is_ok_and(is_whole);
             return match tracks::detect(path)? {
                 Some(preset) if preset.is_generic() && has_meta => highd_inputs(path),
@@ -96,7 +94,7 @@ impl Inputs {
             }
         }
         for (file, found) in foreign {
-            self.files.retain(|of| of.paths()[0] != file);
+            self.files.retain(|of| *of.paths()[0] != file);
             let has_ending = tracks::ending(&file_name(&file)).is_some_and(|ending| endings.contains(&ending));
             match found {
                 Ok(Some(other)) => {
@@ -153,7 +151,7 @@ impl InputFile {
             if let Some(grave) = understanding.findings.iter().find(|finding| finding.is_grave)
                 && implausible == Implausible::Refused
             {
-                let place = Place::file(&self.paths()[0]).of(format!("recording {}", loaded.recording.id));
+                let place = Place::file(self.paths()[0]).of(format!("recording {}", loaded.recording.id));
                 let format = if matches!(self, InputFile::Highd(_)) { HIGHD_HELP } else { "" };
                 let help = format!(
                     "`lanesweep tracks` shows all; {} uses the tracks as they are{format}",
@@ -168,12 +166,10 @@ impl InputFile {
     }
 
     /// The files that are read.
-    pub(crate) fn paths(&self) -> Vec<PathBuf> {
+    pub(crate) fn paths(&self) -> Vec<&PathBuf> {
         match self {
-            InputFile::Highd(files) => {
-                [&files.tracks, &files.tracks_meta, &files.recording_meta].map(PathBuf::clone).to_vec()
-            }
-            InputFile::Tracks(file, _) => vec![file.path.clone()],
+            InputFile::Highd(files) => files.paths().to_vec(),
+            InputFile::Tracks(file, _) => vec![&file.path],
         }
     }
 }

@@ -3,11 +3,9 @@
 //! Most of the reading time is spent here, so plain decimals have a fast path; the
 //! standard library parses all others. Both round correctly, so the values are equal.
 
-/// Powers of ten that `f64` holds exactly.
-const EXACT_POWERS: [f64; 23] = [
-    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20,
-    1e21, 1e22,
-];
+/// Powers of ten that `f64` holds exactly, for every number of decimals of a short number.
+const EXACT_POWERS: [f64; EXACT_DIGITS + 1] =
+    [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
 
 /// Digits below which any integer is exact in `f64` (10^15 < 2^53).
 const EXACT_DIGITS: usize = 15;
@@ -24,12 +22,10 @@ pub(super) fn real(field: &[u8]) -> Option<f64> {
 
 /// The whole number in a field; `7.0` counts as 7, because data frames often write it so.
 pub(super) fn integer(field: &[u8]) -> Option<i64> {
-    short_integer(field).or_else(|| {
+    let whole = |value: f64| (value.fract() == 0.0 && value.abs() < 1e15).then_some(value as i64);
+    short_decimal(field).and_then(whole).or_else(|| {
         let text = std::str::from_utf8(field).ok()?.trim();
-        text.parse().ok().or_else(|| {
-            let value: f64 = text.parse().ok()?;
-            (value.fract() == 0.0 && value.abs() < 1e15).then_some(value as i64)
-        })
+        text.parse().ok().or_else(|| whole(text.parse().ok()?))
     })
 }
 
@@ -64,21 +60,6 @@ pub(super) fn short_decimal(field: &[u8]) -> Option<f64> {
     };
     let value = mantissa as f64 / EXACT_POWERS[decimals];
     Some(if negative { -value } else { value })
-}
-
-fn short_integer(field: &[u8]) -> Option<i64> {
-    if field.is_empty() || field.len() > EXACT_DIGITS {
-        return None;
-    }
-    let mut value = 0i64;
-    for &byte in field {
-        let digit = byte.wrapping_sub(b'0');
-        if digit > 9 {
-            return None;
-        }
-        value = value * 10 + i64::from(digit);
-    }
-    Some(value)
 }
 
 /// The value that the text of `value` reads as; `value` within ±10¹².

@@ -92,10 +92,11 @@ impl Lane {
 }
 
 /// Kind of vehicle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum VehicleClass {
     /// Passenger car, van, motorcycle.
+    #[default]
     Car,
     /// Lorry or bus.
     Truck,
@@ -103,7 +104,7 @@ pub enum VehicleClass {
 
 /// One vehicle's trajectory, without gaps: sample `k` belongs to frame `first_frame + k`. All series have the same
 /// length, at least 1.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Track {
     /// Number of the vehicle in its recording.
     pub id: u32,

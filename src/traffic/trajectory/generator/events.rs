@@ -5,9 +5,9 @@
 //! occur, not their shape.
 
 use super::braking::Braking;
-use super::lane_change::{Manner, Way, acceptance, motive};
+use super::lane_change::{Way, acceptance, motive};
 use super::lateral::LaneChangeMotion;
-use super::traffic::{DECISION_S, Hazards, Traffic};
+use super::traffic::{DECISION_S, Traffic};
 use super::vehicle::{centre_of, draw_line};
 use crate::trajectory::VehicleClass;
 
@@ -36,10 +36,10 @@ impl Traffic<'_> {
             }
             let s_m = self.vehicles[i].s_m;
             let in_view = s_m > -RAISED_BEFORE_M && s_m < self.options.window_m;
-            let hazards = if in_view { self.hazards_in_view } else { Hazards::UNRAISED };
+            let [brakings, lane_changes] = if in_view { self.hazards_in_view } else { [1.0; 2] };
             if self.vehicles[i].braking.is_none() && self.vehicles[i].change.is_none() {
-                self.consider_braking(place, hazards.brakings);
-                self.consider_lane_change(place, hazards.lane_changes);
+                self.consider_braking(place, brakings);
+                self.consider_lane_change(place, lane_changes);
             }
         }
     }
@@ -82,10 +82,10 @@ impl Traffic<'_> {
             let of_class = if own.class == VehicleClass::Truck { behaviour.truck_change_factor } else { 1.0 };
             let motive = motive(way, own.speed_mps, &own.driver, here, there.ahead);
             let rate = LANE_CHANGES_PER_S * of_class * motive;
-            let manner = Manner::draw(behaviour, &mut self.decisions);
-            let accepted = acceptance(own.speed_mps, there, manner, behaviour);
+            let accelerates = self.decisions.chance(behaviour.accelerating_fraction);
+            let accepted = acceptance(own.speed_mps, there, accelerates, behaviour);
             if self.decisions.chance(rate * factor * accepted * DECISION_S) {
-                self.start_lane_change(i, to, manner == Manner::Accelerating);
+                self.start_lane_change(i, to, accelerates);
                 return;
             }
         }

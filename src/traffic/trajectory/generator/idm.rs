@@ -6,7 +6,7 @@
 //! full braking after a merge with a short gap. Real drivers open such a gap slowly.
 
 /// Parameters of one driver.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct DriverParameters {
     /// Desired speed v0, m/s.
     pub desired_speed_mps: f64,

@@ -2,7 +2,6 @@
 
 use super::idm::DriverParameters;
 use super::options::Behaviour;
-use super::random::TrafficRandom;
 
 /// The motive to change to a faster lane increases up to this gain in speed, m/s.
 const FULL_GAIN_MPS: f64 = 4.5;
@@ -70,22 +69,6 @@ pub(super) enum Way {
     Right,
 }
 
-/// How a driver treats the vehicle behind in the lane to enter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Manner {
-    /// Hardly lets it brake.
-    Considerate,
-    /// Lets it brake, and accelerates.
-    Accelerating,
-}
-
-impl Manner {
-    /// Draws the manner of one decision.
-    pub(super) fn draw(behaviour: &Behaviour, stream: &mut TrafficRandom) -> Manner {
-        if stream.chance(behaviour.accelerating_fraction) { Manner::Accelerating } else { Manner::Considerate }
-    }
-}
-
 /// Expected speed in a lane: the desired one on a free road, the leader's close behind it.
 fn promised_speed(speed_mps: f64, driver: &DriverParameters, ahead: Option<Neighbour>) -> f64 {
     let desired = driver.desired_speed_mps;
@@ -118,8 +101,8 @@ pub(super) fn motive(
     share + no_reason
 }
 
-/// Probability of accepting the gaps of the lane to enter.
-pub(super) fn acceptance(speed_mps: f64, there: LaneView, manner: Manner, behaviour: &Behaviour) -> f64 {
+/// Probability of accepting the gaps of the lane to enter. A driver who accelerates lets the vehicle behind brake, others hardly.
+pub(super) fn acceptance(speed_mps: f64, there: LaneView, accelerates: bool, behaviour: &Behaviour) -> f64 {
     let soft_step = |value: f64, half: f64| {
         let squared = (value / half) * (value / half);
         squared * squared / (1.0 + squared * squared)
@@ -142,9 +125,9 @@ pub(super) fn acceptance(speed_mps: f64, there: LaneView, manner: Manner, behavi
             if braking > MAX_FOLLOWER_BRAKING_MPS2 {
                 return 0.0;
             }
-            let tolerated_mps2 = match manner {
-                Manner::Considerate => behaviour.follower_braking_mps2,
-                Manner::Accelerating => behaviour.accelerating_follower_braking_mps2,
+            let tolerated_mps2 = match accelerates {
+                true => behaviour.accelerating_follower_braking_mps2,
+                false => behaviour.follower_braking_mps2,
             };
             accepted *= libm::exp(-braking / tolerated_mps2);
         }

@@ -18,23 +18,10 @@ const SETTLE_S: f64 = 4.0;
 /// power.
 const CROWDING: f64 = 1.56;
 
-/// Factors on the hazards.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Hazards {
-    pub brakings: f64,
-    pub lane_changes: f64,
-}
-
-impl Hazards {
-    /// As published.
-    pub(super) const UNRAISED: Hazards = Hazards { brakings: 1.0, lane_changes: 1.0 };
-
-    /// The factors that raise both rates by `factor`.
-    fn raised(factor: f64) -> Hazards {
-        // There is no crowding below the published rates.
-        let lane_changes = if factor > 1.0 { libm::pow(factor, CROWDING) } else { factor };
-        Hazards { brakings: factor, lane_changes }
-    }
+/// Factors on the hazards of brakings and of lane changes that raise both rates by `factor`.
+fn raised(factor: f64) -> [f64; 2] {
+    // There is no crowding below the published rates.
+    [factor, if factor > 1.0 { libm::pow(factor, CROWDING) } else { factor }]
 }
 
 /// Road before the camera's view, m. Followers need this distance to settle behind their leaders. On a longer road,
@@ -83,7 +70,8 @@ pub(super) struct Traffic<'a> {
     pub(super) decisions: TrafficRandom,
     pub(super) step: usize,
     pub(super) decision_steps: usize,
-    pub(super) hazards_in_view: Hazards,
+    /// Factors on the hazards of brakings and of lane changes in view.
+    pub(super) hazards_in_view: [f64; 2],
     /// Factors of one step of the noise, the lag, the perception and the relaxation.
     noise_keep: f64,
     noise_kick: f64,
@@ -121,7 +109,7 @@ impl<'a> Traffic<'a> {
             lag: 1.0 - libm::exp(-dt / ACTUATION_LAG_S),
             perception: 1.0 - libm::exp(-dt / PERCEPTION_S),
             relaxation: 1.0 - libm::exp(-dt / RELAXATION_S),
-            hazards_in_view: Hazards::raised(options.event_rate_factor),
+            hazards_in_view: raised(options.event_rate_factor),
             options,
             lane_width_m,
             step_s: dt,
@@ -198,11 +186,8 @@ impl<'a> Traffic<'a> {
             let driver = own.driver;
             let view_of = |k: usize, perceived_mps2: f64| {
                 let v = &self.vehicles[k];
-                LeaderView {
-                    gap_m: v.rear_m() - own.front_m(),
-                    speed_mps: v.speed_mps,
-                    acceleration_mps2: perceived_mps2,
-                }
+                let gap_m = v.rear_m() - own.front_m();
+                LeaderView { gap_m, speed_mps: v.speed_mps, acceleration_mps2: perceived_mps2 }
             };
 
             // The driver tolerates a short distance to a new leader (after a cut-in or a lane change).
@@ -220,11 +205,8 @@ impl<'a> Traffic<'a> {
             }
 
             // During a lane change the driver keeps a smaller headway.
-            let kept_s = if own.change.is_some() {
-                self.options.behaviour.change_headway_fraction * headway_s
-            } else {
-                headway_s
-            };
+            let kept = own.change.map_or(1.0, |_| self.options.behaviour.change_headway_fraction);
+            let kept_s = kept * headway_s;
             let mut command = leader.map_or_else(
                 || free_acceleration(own.speed_mps, &driver),
                 |k| following_acceleration(own.speed_mps, kept_s, view_of(k, perceived), &driver),
@@ -242,8 +224,8 @@ impl<'a> Traffic<'a> {
                 && let Some(acceleration_mps2) = change.acceleration_mps2
             {
                 let room = |k: usize| {
-                    let v = &self.vehicles[k];
-                    let (gap_m, closing_mps) = (v.rear_m() - own.front_m(), own.speed_mps - v.speed_mps);
+                    let LeaderView { gap_m, speed_mps, .. } = view_of(k, 0.0);
+                    let closing_mps = own.speed_mps - speed_mps;
                     gap_m > ROOM_M + ROOM_HEADWAY_S * own.speed_mps && gap_m > ROOM_TTC_S * closing_mps
                 };
                 let old = if own.is_in(change.from_lane) { last_in[change.from_lane] } else { None };

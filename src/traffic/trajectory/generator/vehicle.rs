@@ -32,7 +32,7 @@ pub(super) struct Samples {
 }
 
 /// A vehicle with its driver.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Vehicle {
     /// Car or truck.
     pub class: VehicleClass,
@@ -94,45 +94,36 @@ impl Vehicle {
                 (stream.normal_within(8.9, 2.0, 5.5, 13.0), stream.normal_within(2.42, 0.12, 2.1, 2.6))
             }
         };
-        let driver = match class {
-            VehicleClass::Car => DriverParameters {
-                desired_speed_mps: stream.normal_within(lane_speed_mps, 3.2, 24.0, 52.0),
-                time_headway_s: stream.lognormal_within(CAR_HEADWAY_S, HEADWAY_SIGMA, 0.45, 4.5),
-                standstill_gap_m: 3.4,
-                acceleration_mps2: stream.lognormal_within(0.55, 0.25, 0.3, 1.2),
-                comfortable_mps2: stream.lognormal_within(1.5, 0.2, 0.9, 2.5),
-                overreaction,
-            },
-            VehicleClass::Truck => DriverParameters {
-                desired_speed_mps: stream.normal_within(23.9, 0.9, 21.2, 26.5),
-                time_headway_s: stream.lognormal_within(TRUCK_HEADWAY_S, HEADWAY_SIGMA, 0.8, 4.5),
-                standstill_gap_m: 3.4,
-                acceleration_mps2: stream.lognormal_within(0.45, 0.25, 0.2, 0.9),
-                comfortable_mps2: stream.lognormal_within(1.2, 0.2, 0.8, 2.0),
-                overreaction,
-            },
+        let [desired_speed_mps, time_headway_s, acceleration_mps2, comfortable_mps2] = match class {
+            VehicleClass::Car => [
+                stream.normal_within(lane_speed_mps, 3.2, 24.0, 52.0),
+                stream.lognormal_within(CAR_HEADWAY_S, HEADWAY_SIGMA, 0.45, 4.5),
+                stream.lognormal_within(0.55, 0.25, 0.3, 1.2),
+                stream.lognormal_within(1.5, 0.2, 0.9, 2.5),
+            ],
+            VehicleClass::Truck => [
+                stream.normal_within(23.9, 0.9, 21.2, 26.5),
+                stream.lognormal_within(TRUCK_HEADWAY_S, HEADWAY_SIGMA, 0.8, 4.5),
+                stream.lognormal_within(0.45, 0.25, 0.2, 0.9),
+                stream.lognormal_within(1.2, 0.2, 0.8, 2.0),
+            ],
+        };
+        let driver = DriverParameters {
+            desired_speed_mps,
+            time_headway_s,
+            standstill_gap_m: 3.4,
+            acceleration_mps2,
+            comfortable_mps2,
+            overreaction,
         };
         Vehicle {
             class,
             length_m,
             width_m,
             driver,
-            s_m: 0.0,
             speed_mps: driver.desired_speed_mps,
-            acceleration_mps2: 0.0,
-            command_mps2: 0.0,
-            noise_mps2: 0.0,
             headway_s: driver.time_headway_s,
-            leader: None,
-            perceived_mps2: 0.0,
-            lane: 0,
-            occupied: 1,
-            line_m: 0.0,
-            wander: Wander::default(),
-            change: None,
-            braking: None,
-            settle_s: 0.0,
-            samples: Samples::default(),
+            ..Vehicle::default()
         }
     }
 

@@ -1,7 +1,5 @@
 //! Headers of the three highD files, with the columns in the order of the format.
 
-use crate::trajectory::csv_table::CsvFormat;
-
 /// `NN_tracks.csv`: one line per vehicle and frame.
 pub(super) const TRACKS_HEADER: &str = "frame,id,x,y,width,height,xVelocity,yVelocity,xAcceleration,yAcceleration,\
     frontSightDistance,backSightDistance,dhw,thw,ttc,precedingXVelocity,precedingId,followingId,leftPrecedingId,\
@@ -15,11 +13,6 @@ pub(super) const TRACKS_META_HEADER: &str = "id,width,height,initialFrame,finalF
 pub(super) const RECORDING_META_HEADER: &str = "id,frameRate,locationId,speedLimit,month,weekDay,startTime,duration,\
     totalDrivenDistance,totalDrivenTime,numVehicles,numCars,numTrucks,upperLaneMarkings,lowerLaneMarkings,\
     synthetic";
-
-/// How a table with this header is read.
-pub(super) fn csv_format(header: &'static str) -> CsvFormat {
-    CsvFormat { name: "highD", header, delimiter: Some(b',') }
-}
 
 /// Valid frame rates. Others are errors, for instance a period instead of a rate, and derived counts would overflow.
 pub(super) const FRAME_RATES_HZ: std::ops::RangeInclusive<f64> = 0.1..=10_000.0;

@@ -24,23 +24,22 @@ pub struct HighdFiles {
 impl HighdFiles {
     /// The names the three files of recording `id` have in `dir`.
     pub fn named(dir: &Path, id: &str) -> Self {
-        let [tracks, tracks_meta, recording_meta] = SUFFIXES.map(|suffix| dir.join(format!("{id}{suffix}")));
-        HighdFiles { id: id.to_owned(), tracks, tracks_meta, recording_meta }
+        HighdFiles::each(dir, id, |path| path)
     }
 
     /// The same; files that only gzip's ending tells from these names take their places.
     pub(in crate::trajectory) fn found(dir: &Path, id: &str) -> Self {
-        let HighdFiles { id, tracks, tracks_meta, recording_meta } = HighdFiles::named(dir, id);
-        let [tracks, tracks_meta, recording_meta] =
-            [tracks, tracks_meta, recording_meta].map(input_file::packed_or_not);
-        HighdFiles { id, tracks, tracks_meta, recording_meta }
+        HighdFiles::each(dir, id, input_file::packed_or_not)
     }
-}
 
-impl HighdFiles {
-    /// Whether all three are there.
-    pub(in crate::trajectory) fn is_complete(&self) -> bool {
-        self.tracks.exists() && self.tracks_meta.exists() && self.recording_meta.exists()
+    fn each(dir: &Path, id: &str, path: fn(PathBuf) -> PathBuf) -> Self {
+        let [tracks, tracks_meta, recording_meta] = SUFFIXES.map(|suffix| path(dir.join(format!("{id}{suffix}"))));
+        HighdFiles { id: id.to_owned(), tracks, tracks_meta, recording_meta }
+    }
+
+    /// All three.
+    pub(in crate::trajectory) fn paths(&self) -> [&PathBuf; 3] {
+        [&self.tracks, &self.tracks_meta, &self.recording_meta]
     }
 }
 
@@ -70,21 +69,19 @@ pub fn inventory(dir: &Path) -> Result<Inventory> {
     }
     let mut inventory = Inventory { recordings: Vec::new(), problems: Vec::new() };
     for (id, present) in found {
-        let missing: Vec<String> =
-            (0..3).filter(|&file| !present[file]).map(|file| format!("{id}{}", SUFFIXES[file])).collect();
+        let names = SUFFIXES.map(|suffix| format!("{id}{suffix}"));
+        let missing: Vec<&str> =
+            names.iter().zip(present).filter(|(_, is)| !is).map(|(name, _)| name.as_str()).collect();
         if missing.is_empty() {
             inventory.recordings.push(HighdFiles::found(dir, &id));
-        } else {
-            inventory.problems.push(Error::input(
-                Place::file(dir).of(format!("recording `{id}`")),
-                format!(
-                    "{} missing; a recording consists of {}",
-                    are(&missing),
-                    SUFFIXES.map(|s| format!("{id}{s}")).join(", ")
-                ),
-                "add what is missing, or remove the other files of this recording",
-            ));
+            continue;
         }
+        let (missing, are) = (missing.join(" and "), if missing.len() == 1 { "is" } else { "are" });
+        inventory.problems.push(Error::input(
+            Place::file(dir).of(format!("recording `{id}`")),
+            format!("{missing} {are} missing; a recording consists of {}", names.join(", ")),
+            "add what is missing, or remove the other files of this recording",
+        ));
     }
     if inventory.recordings.is_empty() {
         return Err(nothing_complete(dir, inventory.problems));
@@ -161,8 +158,4 @@ fn subfolders_with_recordings(dir: &Path) -> Vec<PathBuf> {
     let mut folders: Vec<PathBuf> = listed.filter(is_such).collect();
     folders.sort();
     folders
-}
-
-fn are(names: &[String]) -> String {
-    format!("{} {}", names.join(" and "), if names.len() == 1 { "is" } else { "are" })
 }

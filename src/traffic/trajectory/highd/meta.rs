@@ -1,11 +1,11 @@
 //! The two small files of a recording: `recordingMeta` (frame rate, lane lines) and `tracksMeta`
 //! (size, class and direction of each vehicle).
 
-use super::format::{FRAME_RATES_HZ, LANE_LINES_LIMIT, RECORDING_META_HEADER, TRACKS_META_HEADER, csv_format};
+use super::format::{FRAME_RATES_HZ, LANE_LINES_LIMIT, RECORDING_META_HEADER, TRACKS_META_HEADER};
 use super::frame::{Direction, LaneNumbers};
 use super::inventory::HighdFiles;
 use crate::trajectory::csv_table::{CsvColumn, CsvTable, FileChecksum, quoted};
-use crate::trajectory::{Carriageway, VehicleClass, number};
+use crate::trajectory::{Carriageway, Track, VehicleClass, number};
 use lanesweep_model::plausibility::{Doubts, HELP, Quantity};
 use lanesweep_support::{Error, Place, Result};
 
@@ -31,12 +31,11 @@ impl RecordingMeta {
 
 /// Content of `tracksMeta` for one vehicle.
 pub(super) struct VehicleMeta {
-    pub id: u32,
-    pub class: VehicleClass,
-    pub length_m: f64,
-    pub width_m: f64,
+    /// Its track, which begins without samples.
+    pub track: Track,
+    /// Sum of its last accelerations, at most those of a second, m/s².
+    pub last_second_mps2: f64,
     pub direction: Direction,
-    pub carriageway: usize,
     /// Required number of lines in `tracks`, if given.
     pub samples: Option<u64>,
     /// Its first frame, if given.
@@ -45,17 +44,13 @@ pub(super) struct VehicleMeta {
 
 /// Reads `recordingMeta`.
 pub(super) fn read_recording_meta(files: &HighdFiles, doubts: &mut Doubts) -> Result<RecordingMeta> {
-    let mut table = CsvTable::open(&files.recording_meta, csv_format(RECORDING_META_HEADER))?;
-    let frame_rate = table.column("frameRate")?;
-    let upper_column = table.column(Direction::Upper.markings_column())?;
-    let lower_column = table.column(Direction::Lower.markings_column())?;
+    let mut table = CsvTable::open(&files.recording_meta, RECORDING_META_HEADER)?;
+    let columns = ["frameRate", Direction::Upper.markings_column(), Direction::Lower.markings_column()];
+    let [frame_rate, upper_column, lower_column] = table.columns(columns)?;
     let synthetic_column = table.optional_column("synthetic")?;
     if !table.next_row()? {
-        return Err(Error::input(
-            table.file_place(),
-            "the file has no line after the header; expected one that describes the recording",
-            "copy or export the file again",
-        ));
+        let problem = "the file has no line after the header; expected one that describes the recording";
+        return Err(Error::input(table.file_place(), problem, "copy or export the file again"));
     }
     let place = table.place();
     let frame_rate_hz = frames_per_second(&table, frame_rate)?;
@@ -85,11 +80,8 @@ pub(super) fn read_recording_meta(files: &HighdFiles, doubts: &mut Doubts) -> Re
             .try_for_each(|[a, b]| check_plausible(&table, column, Quantity::LaneWidth, b - a, doubts))?;
     }
     if table.next_row()? {
-        return Err(Error::input(
-            table.place(),
-            "a second line; expected one line for this recording",
-            "keep the line of this recording and remove the others",
-        ));
+        let problem = "a second line; expected one line for this recording";
+        return Err(Error::input(table.place(), problem, "keep the line of this recording and remove the others"));
     }
     let lane_numbers = LaneNumbers { lines: [upper.len(), lower.len()] };
     let carriageways = [(Direction::Upper, upper), (Direction::Lower, lower)]
@@ -177,24 +169,25 @@ pub(super) fn read_tracks_meta(
     recording: &RecordingMeta,
     doubts: &mut Doubts,
 ) -> Result<(Vec<VehicleMeta>, FileChecksum)> {
-    let mut table = CsvTable::open(&files.tracks_meta, csv_format(TRACKS_META_HEADER))?;
+    let mut table = CsvTable::open(&files.tracks_meta, TRACKS_META_HEADER)?;
     let columns = MetaColumns::of(&table)?;
     let mut vehicles: Vec<(VehicleMeta, Place)> = Vec::new();
     while table.next_row()? {
         let vehicle = columns.vehicle(&table, recording)?;
-        check_plausible(&table, columns.length, Quantity::Length, vehicle.length_m, doubts)?;
-        check_plausible(&table, columns.width, Quantity::Width, vehicle.width_m, doubts)?;
-        doubts.check_shape(vehicle.length_m, vehicle.width_m, || table.field(columns.length).to_string());
+        let ([_, length, width, ..], Track { length_m, width_m, .. }) = (columns.needed, &vehicle.track);
+        check_plausible(&table, length, Quantity::Length, *length_m, doubts)?;
+        check_plausible(&table, width, Quantity::Width, *width_m, doubts)?;
+        doubts.check_shape(*length_m, *width_m, || table.field(length).to_string());
         vehicles.push((vehicle, table.place()));
     }
     if vehicles.is_empty() {
         return Err(no_vehicle(&table));
     }
     // Stable, so that the error names the later one of two lines with one id.
-    vehicles.sort_by_key(|(vehicle, _)| vehicle.id);
-    if let Some([_, (vehicle, place)]) = vehicles.array_windows().find(|[(a, _), (b, _)]| a.id == b.id) {
+    vehicles.sort_by_key(|(vehicle, _)| vehicle.track.id);
+    if let Some([_, (vehicle, place)]) = vehicles.array_windows().find(|[(a, _), (b, _)]| a.track.id == b.track.id) {
         return Err(Error::input(
-            place.clone().column("id").of(format!("vehicle {}", vehicle.id)),
+            place.clone().column("id").of(format!("vehicle {}", vehicle.track.id)),
             "an earlier line has the same id; expected one line per vehicle",
             "remove the surplus line, or give the vehicle its own id in both files",
         ));
@@ -210,11 +203,8 @@ pub(super) fn no_vehicle(table: &CsvTable) -> Error {
 }
 
 struct MetaColumns {
-    id: CsvColumn,
-    length: CsvColumn,
-    width: CsvColumn,
-    class: CsvColumn,
-    direction: CsvColumn,
+    /// `id`, length, width, `class`, `drivingDirection`.
+    needed: [CsvColumn; 5],
     samples: Option<CsvColumn>,
     first_and_last_frame: Option<(CsvColumn, CsvColumn)>,
 }
@@ -222,29 +212,23 @@ struct MetaColumns {
 impl MetaColumns {
     fn of(table: &CsvTable) -> Result<Self> {
         Ok(MetaColumns {
-            id: table.column("id")?,
             // The box belongs to the image: its width is the vehicle's length.
-            length: table.column("width")?,
-            width: table.column("height")?,
-            class: table.column("class")?,
-            direction: table.column("drivingDirection")?,
+            needed: table.columns(["id", "width", "height", "class", "drivingDirection"])?,
             samples: table.optional_column("numFrames")?,
             first_and_last_frame: table.optional_column("initialFrame")?.zip(table.optional_column("finalFrame")?),
         })
     }
 
     fn vehicle(&self, table: &CsvTable, recording: &RecordingMeta) -> Result<VehicleMeta> {
-        let id = table.integer(self.id)?;
+        let [id_column, length, width, class_column, direction_column] = self.needed;
+        let id = table.integer(id_column)?;
         let id = u32::try_from(id).map_err(|_| {
-            table.bad(self.id, format!("{id} is not a vehicle id; expected 0 to {}", u32::MAX), "correct the id")
+            table.bad(id_column, format!("{id} is not a vehicle id; expected 0 to {}", u32::MAX), "correct the id")
         })?;
-        let direction = Direction::from_number(table.integer(self.direction)?).ok_or_else(|| {
-            let found = table.shown(self.direction);
-            table.bad(
-                self.direction,
-                format!("{found} is not a driving direction; expected 1 (upper lanes) or 2 (lower lanes)"),
-                "correct the value",
-            )
+        let direction = Direction::from_number(table.integer(direction_column)?).ok_or_else(|| {
+            let found = table.shown(direction_column);
+            let problem = format!("{found} is not a driving direction; expected 1 (upper lanes) or 2 (lower lanes)");
+            table.bad(direction_column, problem, "correct the value")
         })?;
         let carriageway = recording.carriageway(direction).ok_or_else(|| {
             Error::input(
@@ -253,13 +237,12 @@ impl MetaColumns {
                 MARKINGS_HELP,
             )
         })?;
+        let class = class(table, class_column)?;
+        let (length_m, width_m) = (table.positive(length)?, table.positive(width)?);
         Ok(VehicleMeta {
-            id,
-            class: class(table, self.class)?,
-            length_m: table.positive(self.length)?,
-            width_m: table.positive(self.width)?,
+            track: Track { id, class, length_m, width_m, carriageway, ..Track::default() },
+            last_second_mps2: 0.0,
             direction,
-            carriageway,
             samples: self.samples(table)?,
             first_frame: self.first_and_last_frame.map(|(first, _)| table.integer(first)).transpose()?,
         })
@@ -274,12 +257,8 @@ impl MetaColumns {
             }
             (None, None) => return Ok(None),
         };
-        match u64::try_from(count) {
-            Ok(count) => Ok(Some(count)),
-            Err(_) => {
-                Err(table.bad(column, format!("{count} frames; expected no negative number"), "correct the value"))
-            }
-        }
+        let bad = |_| table.bad(column, format!("{count} frames; expected no negative number"), "correct the value");
+        u64::try_from(count).map(Some).map_err(bad)
     }
 }
 
@@ -288,10 +267,10 @@ fn class(table: &CsvTable, column: CsvColumn) -> Result<VehicleClass> {
     match table.text(column)?.to_ascii_lowercase().as_str() {
         "car" | "van" | "motorcycle" => Ok(VehicleClass::Car),
         "truck" | "bus" | "trailer" => Ok(VehicleClass::Truck),
-        _ => Err(table.bad(
-            column,
-            format!("{} is not a known class of vehicle; expected `Car` or `Truck`", table.shown(column)),
-            "write `Car` or `Truck`",
-        )),
+        _ => {
+            let found = table.shown(column);
+            let problem = format!("{found} is not a known class of vehicle; expected `Car` or `Truck`");
+            Err(table.bad(column, problem, "write `Car` or `Truck`"))
+        }
     }
 }

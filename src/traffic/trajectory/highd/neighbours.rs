@@ -4,7 +4,7 @@ use crate::trajectory::frame_index::{FrameIndex, VehicleAtFrame};
 use crate::trajectory::{Recording, Track};
 
 /// No vehicle.
-pub(super) const NOBODY: u32 = u32::MAX;
+const NOBODY: u32 = u32::MAX;
 
 /// The vehicles around one vehicle at one instant, as indices into [`Recording::tracks`] or [`NOBODY`], in the order of highD's
 /// columns: the next one ahead and behind in the same lane; in the lane to the left, then to the right, the next one ahead of

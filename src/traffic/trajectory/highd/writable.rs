@@ -63,53 +63,53 @@ impl ImageLayout {
     /// # Errors
     /// The first reason why it cannot.
     pub(super) fn of(recording: &Recording) -> Result<Self> {
-        check_frame(recording)?;
-        let mut layout = ImageLayout {
-            directions: Vec::new(),
-            lines_y: [Vec::new(), Vec::new()],
-            lane_numbers: LaneNumbers { lines: [0; 2] },
+        let refuse = |item: String, problem: &str| {
+            let place = Place::item(format!("recording `{}`{item}", recording.id));
+            Err(Error::input(place, format!("{problem}; highD files cannot represent it"), "correct the recording"))
         };
-        for carriageway in &recording.carriageways {
-            let bad = |problem: &str, help: &str| {
-                let item = format!("recording {}, carriageway `{}`", recording.id, carriageway.name);
-                Error::input(Place::item(item), format!("{problem}; highD files cannot represent it"), help)
+        if let Some(problem) = problem(recording) {
+            return refuse(String::new(), problem);
+        }
+        let (mut directions, mut lines_y) = (Vec::<Direction>::new(), [Vec::new(), Vec::new()]);
+        for of in &recording.carriageways {
+            let follows = |direction: &Direction| directions.last().is_none_or(|last| (*last as u8) < *direction as u8);
+            let named = Direction::BOTH.into_iter().find(|direction| direction.name() == of.name);
+            let item = format!(", carriageway `{}`", of.name);
+            let Some(direction) = named.filter(follows) else {
+                return refuse(
+                    item,
+                    "unknown, repeated or out of order: names are `1` (upper lanes) and `2` (lower lanes)",
+                );
             };
-            let direction = Direction::BOTH
-                .into_iter()
-                .find(|direction| direction.name() == carriageway.name && !layout.directions.contains(direction))
-                .filter(|direction| *direction == Direction::Lower || layout.directions.is_empty())
-                .ok_or_else(|| {
-                    bad("unknown, repeated or out of order", "name them `1` (upper lanes) and `2` (lower lanes)")
-                })?;
-            let mut lines: Vec<f64> =
-                carriageway.lane_lines_m.iter().map(|&d| rounded(direction.leftward(d))).collect();
+            let mut lines: Vec<f64> = of.lane_lines_m.iter().map(|&d| rounded(direction.leftward(d))).collect();
             if direction == Direction::Upper {
                 lines.reverse();
             }
-            if !carriageway.lane_lines_m.iter().all(|d| in_range(*d))
+            if !of.lane_lines_m.iter().all(|d| in_range(*d))
                 || !(2..=LANE_LINES_LIMIT).contains(&lines.len())
                 || lines.array_windows().any(|[above, below]| above >= below)
             {
-                return Err(bad(
-                    "its lane lines are not at least two values that fall from left to right",
-                    "give the lines from left to right, at least a hundredth of a metre apart",
-                ));
+                return refuse(
+                    item,
+                    "its lane lines are not at least two that fall from left to right by 0.01 m and more",
+                );
             }
-            layout.lines_y[direction as usize] = lines;
-            layout.directions.push(direction);
+            lines_y[direction as usize] = lines;
+            directions.push(direction);
         }
-        if let [Some(last_upper), Some(first_lower)] = [layout.lines_y[0].last(), layout.lines_y[1].first()]
+        if let [Some(last_upper), Some(first_lower)] = [lines_y[0].last(), lines_y[1].first()]
             && last_upper > first_lower
         {
-            return Err(Error::input(
-                Place::item(format!("recording {}", recording.id)),
-                "carriageway `1` does not lie above carriageway `2` (y = d for `1`, y = −d for `2`)",
-                "shift one of them sideways",
-            ));
+            let problem = "carriageway `1` does not lie above carriageway `2` (y = d for `1`, y = −d for `2`)";
+            return refuse(String::new(), problem);
         }
-        layout.lane_numbers.lines = [0, 1].map(|half| layout.lines_y[half].len());
-        check_tracks(recording)?;
-        Ok(layout)
+        for track in &recording.tracks {
+            if let Some(problem) = track_problem(track, recording) {
+                return refuse(format!(", vehicle {}", track.id), problem);
+            }
+        }
+        let lane_numbers = LaneNumbers { lines: [lines_y[0].len(), lines_y[1].len()] };
+        Ok(ImageLayout { directions, lines_y, lane_numbers })
     }
 
     /// `laneId` of a lane; for [`NO_LANE`] a number that reads as no lane, if possible the number of lines above.
@@ -128,34 +128,19 @@ fn in_range(value: f64) -> bool {
     value.abs() <= 0.5 * REAL_LIMIT
 }
 
-fn check_frame(recording: &Recording) -> Result<()> {
-    let bad = |problem: &str, help: &str| {
-        Err(Error::input(Place::item(format!("recording `{}`", recording.id)), problem, help))
-    };
-    if recording.id.is_empty() || recording.id.starts_with('.') || recording.id.contains(['/', '\\', '\0']) {
-        return bad("the name cannot begin a file name", "use a short name such as `01`");
+fn problem(recording: &Recording) -> Option<&'static str> {
+    let Recording { id, frame_rate_hz, carriageways, tracks, .. } = recording;
+    if id.is_empty() || id.starts_with('.') || id.contains(['/', '\\', '\0']) {
+        Some("its name cannot begin a file name")
+    } else if !FRAME_RATES_HZ.contains(frame_rate_hz) {
+        Some("its frame rate is not between 0.1 and 10000 Hz")
+    } else if carriageways.is_empty() || tracks.is_empty() {
+        Some("it has no carriageway or no vehicle")
+    } else if tracks.array_windows().any(|[a, b]| a.id >= b.id) {
+        Some("its vehicles are not sorted by id, or two have the same")
+    } else {
+        None
     }
-    if !FRAME_RATES_HZ.contains(&recording.frame_rate_hz) {
-        return bad("the frame rate is out of range", "use a rate between 0.01 and 10000 frames per second");
-    }
-    if recording.carriageways.is_empty() || recording.tracks.is_empty() {
-        return bad("no carriageway or no vehicle; highD files cannot represent it", "add at least one of each");
-    }
-    if recording.tracks.array_windows().any(|[a, b]| a.id >= b.id) {
-        return bad("the vehicles are not sorted by id, or two have the same", "sort them, each with its own id");
-    }
-    Ok(())
-}
-
-fn check_tracks(recording: &Recording) -> Result<()> {
-    for track in &recording.tracks {
-        if let Some(problem) = track_problem(track, recording) {
-            let place = Place::item(format!("recording {}, vehicle {}", recording.id, track.id));
-            let problem = format!("{problem}; highD files cannot represent it");
-            return Err(Error::input(place, problem, "correct the recording"));
-        }
-    }
-    Ok(())
 }
 
 fn track_problem(track: &Track, recording: &Recording) -> Option<&'static str> {

@@ -7,7 +7,7 @@ use std::path::Path;
 use super::format::{RECORDING_META_HEADER, TRACKS_HEADER, TRACKS_META_HEADER};
 use super::frame::Direction;
 use super::inventory::HighdFiles;
-use super::neighbours::{Around, NOBODY, neighbours};
+use super::neighbours::{Around, neighbours};
 use super::writable::ImageLayout;
 use crate::trajectory::number::{push_hundredths, push_integer, rounded};
 use crate::trajectory::tracks::central;
@@ -67,26 +67,12 @@ struct Writer<'a> {
     extent_m: (f64, f64),
 }
 
-/// Headways of one instant. Undefined ones are written as 0, as in highD without a preceding vehicle.
-#[derive(Default)]
-struct Headways {
-    dhw_m: f64,
-    /// `None` at a standstill.
-    thw_s: Option<f64>,
-    /// `None` at equal speeds.
-    ttc_s: Option<f64>,
-    preceding_v_s_mps: f64,
-}
+/// Gap to the vehicle ahead, m, time headway, s, time to collision, s, and that vehicle's speed, m/s. Infinite at a standstill or
+/// at equal speeds; `None` without a vehicle ahead.
+type Headways = Option<[f64; 4]>;
 
-/// Minimum dhw, thw and positive ttc of one vehicle; `None` if it never follows another.
-type Minima = [Option<f64>; 3];
-
-fn lower(minima: &mut Minima, headways: &Headways) {
-    let found = [Some(headways.dhw_m), headways.thw_s, headways.ttc_s.filter(|ttc_s| *ttc_s > 0.0)];
-    for (min, value) in minima.iter_mut().zip(found) {
-        *min = min.iter().copied().chain(value).reduce(f64::min);
-    }
-}
+/// Minimum dhw, thw and positive ttc of one vehicle; infinite if it never follows another.
+type Minima = [f64; 3];
 
 impl Writer<'_> {
     fn direction(&self, track: &Track) -> Direction {
@@ -96,16 +82,17 @@ impl Writer<'_> {
     fn tracks(&self, path: &Path) -> Result<(StagedFile, Vec<Minima>)> {
         let mut file = begun(path, TRACKS_HEADER)?;
         let around = neighbours(self.recording);
-        let mut all_minima = vec![Minima::default(); self.recording.tracks.len()];
+        let mut all_minima = vec![[f64::INFINITY; 3]; self.recording.tracks.len()];
         let mut line = CsvLine::default();
         for ((track, around), minima) in self.recording.tracks.iter().zip(&around).zip(&mut all_minima) {
             let leftward_mps2 = central(&track.v_d_mps, self.recording.frame_rate_hz);
             for (sample, (around, leftward_mps2)) in around.iter().zip(leftward_mps2).enumerate() {
                 let headways = self.headways(track, sample, around);
-                if around[0] != NOBODY {
-                    lower(minima, &headways);
+                if let Some([dhw_m, thw_s, ttc_s, _]) = headways {
+                    let found = [dhw_m, thw_s, if ttc_s > 0.0 { ttc_s } else { f64::INFINITY }];
+                    minima.iter_mut().zip(found).for_each(|(min, value)| *min = min.min(value));
                 }
-                self.track_line(&mut line, (track, sample), around, &headways, leftward_mps2);
+                self.track_line(&mut line, (track, sample), around, headways, leftward_mps2);
                 line.end(&mut file)?;
             }
         }
@@ -117,7 +104,7 @@ impl Writer<'_> {
         line: &mut CsvLine,
         (track, sample): (&Track, usize),
         around: &Around,
-        headways: &Headways,
+        headways: Headways,
         leftward_mps2: f64,
     ) {
         let direction = self.direction(track);
@@ -140,10 +127,12 @@ impl Writer<'_> {
         };
         line.number(front);
         line.number(back);
-        line.number(headways.dhw_m);
-        line.number(headways.thw_s.unwrap_or(0.0));
-        line.number(headways.ttc_s.unwrap_or(0.0));
-        line.number(direction.forward(headways.preceding_v_s_mps));
+        // What is undefined is 0, as in highD without a preceding vehicle.
+        let [dhw_m, thw_s, ttc_s, ahead_mps] = headways.unwrap_or_default();
+        let defined = |value: f64| if value.is_finite() { value } else { 0.0 };
+        for value in [dhw_m, defined(thw_s), defined(ttc_s), direction.forward(ahead_mps)] {
+            line.number(value);
+        }
         for index in around {
             line.integer(self.recording.tracks.get(*index as usize).map_or(0, |other| i64::from(other.id)));
         }
@@ -151,15 +140,13 @@ impl Writer<'_> {
     }
 
     fn headways(&self, track: &Track, sample: usize, around: &Around) -> Headways {
-        let Some(ahead) = self.recording.tracks.get(around[0] as usize) else { return Headways::default() };
-        let Some(ahead_sample) = ahead.index_of(track.first_frame + sample as i64) else { return Headways::default() };
+        let ahead = self.recording.tracks.get(around[0] as usize)?;
+        let ahead_sample = ahead.index_of(track.first_frame + sample as i64)?;
         let (speed, ahead_speed) = (track.v_s_mps[sample], ahead.v_s_mps[ahead_sample]);
         let between_centres_m = ahead.s_m[ahead_sample] - track.s_m[sample];
         let dhw_m = (between_centres_m - 0.5 * (ahead.length_m + track.length_m)).max(0.0);
-        let closing = speed - ahead_speed;
-        let over = |speed: f64| (speed.abs() > STANDSTILL_MPS).then(|| dhw_m / speed);
-        let (thw_s, ttc_s) = (over(speed.abs()), over(closing));
-        Headways { dhw_m, thw_s, ttc_s, preceding_v_s_mps: ahead_speed }
+        let over = |speed: f64| if speed.abs() > STANDSTILL_MPS { dhw_m / speed } else { f64::INFINITY };
+        Some([dhw_m, over(speed.abs()), over(speed - ahead_speed), ahead_speed])
     }
 
     fn tracks_meta(&self, path: &Path, minima: &[Minima]) -> Result<StagedFile> {
@@ -182,7 +169,7 @@ impl Writer<'_> {
             line.number(speeds().fold(f64::INFINITY, f64::min));
             line.number(speeds().fold(0.0, f64::max));
             line.number(speeds().sum::<f64>() / track.len() as f64);
-            minima.iter().for_each(|min| line.number(min.unwrap_or(-1.0)));
+            minima.iter().for_each(|min| line.number(if min.is_finite() { *min } else { -1.0 }));
             line.integer(track.lane.array_windows().filter(|[before, after]| before != after).count() as i64);
             line.end(&mut file)?;
         }
@@ -256,12 +243,11 @@ impl CsvLine {
     /// Several numbers in one field.
     fn list(&mut self, values: &[f64]) {
         let field = self.field();
-        for (at, &value) in values.iter().enumerate() {
-            if at > 0 {
-                field.push(b';');
-            }
+        for &value in values {
             push_hundredths(field, value);
+            field.push(b';');
         }
+        field.pop_if(|last| *last == b';');
     }
 
     fn integer(&mut self, value: i64) {

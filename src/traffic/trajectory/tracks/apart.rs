@@ -83,7 +83,7 @@ fn periods(mut recording: RawRecording, rate_hz: f64) -> Vec<RawRecording> {
             }
         }
         for (part, samples) in parts.iter_mut().zip(of_part).filter(|(_, samples)| samples.len() > 0) {
-            part.vehicles.push(vehicle.part(samples, &part.classes));
+            part.vehicles.push(RawVehicle { key: vehicle.key.clone(), samples });
         }
     }
     if strays > 0 {
@@ -108,9 +108,8 @@ fn part_returning(mut recording: RawRecording, per_s: f64, preset: &Preset) -> R
         }
         let samples = vehicle.samples.to_vec();
         let parts = samples.chunk_by(|a, b| b[AT] - a[AT] <= pause);
-        let part = |part: &[Sample]| vehicle.part(part.iter().collect(), &recording.classes);
-        let parts: Vec<RawVehicle> = parts.map(part).collect();
-        recording.vehicles.extend(parts);
+        let part = |part: &[Sample]| RawVehicle { key: vehicle.key.clone(), samples: part.iter().collect() };
+        recording.vehicles.extend(parts.map(part));
     }
     let more = recording.vehicles.len() - numbers;
     if more > 0 {

@@ -3,14 +3,13 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 use super::LoadedTracks;
-use super::boxes::{Sized, begins_so, centre, is_ignored, sized};
+use super::boxes::{begins_so, centre, is_ignored};
 use super::directions::{Placed, oncoming_left_m, road};
 use super::lanes::{BY_NAME, Lateral, lane_lines};
 use super::pieces::{Piece, pieces};
 use super::preset::Preset;
-use super::raw::{FileFacts, RawRecording, RawVehicle};
+use super::raw::{RawRecording, RawVehicle};
 use super::road::{Path, RoadLine, cross, dot, median};
-use super::roles::Role;
 use super::samples::{
     ACCELERATION, AT, FORWARD_SPEED, HEADING_X, HEADING_Y, LANE_OFFSET, LEFTWARD_SPEED, OTHER_CLOCK, SPEED, Sample,
     Samples, X, X_ACCELERATION, X_SPEED, Y, Y_ACCELERATION, Y_SPEED,
@@ -32,42 +31,34 @@ fn path(piece: &Piece) -> Path {
 }
 
 /// The recording, and what was understood.
-pub(super) fn assemble(
-    mut raw: RawRecording,
-    preset: &Preset,
-    file: &FileFacts,
-    place: &Place,
-) -> Result<LoadedTracks> {
+pub(super) fn assemble(mut raw: RawRecording, preset: &Preset, place: &Place) -> Result<LoadedTracks> {
     let mut about = Understanding::new(&raw.id);
-    describe_columns(&mut about, &raw, preset, file);
+    about.fact("columns", std::mem::take(&mut raw.columns));
+    about.fact("reference", format!("{:?}, as the preset says or assumes", preset.reference).to_lowercase());
+    describe_classes(&mut about, &raw, preset);
     std::mem::take(&mut raw.notes).into_iter().for_each(|note| about.warn(note));
     about.warn_of(raw.incomplete, "rows have no position and are left out");
     let before = raw.vehicles.len();
-    raw.vehicles.retain(|vehicle| !is_ignored(vehicle, preset));
+    raw.vehicles.retain(|vehicle| !is_ignored(&vehicle.samples, &raw.classes, preset));
     about.warn_of((before - raw.vehicles.len()) as u64, "vehicles are left out because of their class");
     let (rate_hz, mut pieces) = pieces(&mut raw, preset, &mut about, place)?;
-    let of_piece = |piece: &Piece| sized(piece, &raw.vehicles[piece.vehicle], &raw.classes, preset);
-    let boxes: Vec<Sized> = pieces.iter().map(of_piece).collect();
-    match (boxes.iter().filter(|of| of.is_assumed).count() as u64, &preset.sizes_from) {
+    match (pieces.iter().filter(|of| of.sized.is_assumed).count() as u64, &preset.sizes_from) {
         (0, _) => (),
         (assumed, Some(help)) => about.refuse(format!("{assumed} vehicles have no size: make the table by {help}")),
         (assumed, None) => about.warn_of(assumed, "vehicles have no size in the file; usual ones take its place"),
     }
-    let has = |wanted: Role| file.roles.iter().any(|(role, _)| *role == wanted);
-    let has_heading = has(Role::Heading);
     let longest = pieces.iter().map(Piece::travel_m).max_by(|a, b| dot(*a, *a).total_cmp(&dot(*b, *b)));
     let travel = longest.unwrap_or_default();
-    let left: Vec<f64> = pieces.iter_mut().zip(&boxes).map(|(piece, of)| centre(piece, of, preset, travel)).collect();
-    let (lines, forward) = road(&pieces, &raw, preset, rate_hz).ok_or_else(|| {
+    let left: Vec<f64> = pieces.iter_mut().map(|piece| centre(piece, preset, travel)).collect();
+    let (lines, forward) = road(&pieces, preset, rate_hz).ok_or_else(|| {
         Error::input(place.clone(), "no vehicle moves, so the road is unknown", "check x and y and their units")
     })?;
-    let placed =
-        pieces.into_iter().zip(boxes).zip(left).zip(forward).filter_map(|(((piece, sized), left), is_forward)| {
-            // A direction in which nothing moves has no line.
-            let mut on = lines[usize::from(is_forward)].as_ref()?.project_all(&path(&piece));
-            on.iter_mut().for_each(|p| p.s_m += left * sized.length_m);
-            Some(Placed { piece, sized, is_forward, on })
-        });
+    let placed = pieces.into_iter().zip(left).zip(forward).filter_map(|((piece, left), is_forward)| {
+        // A direction in which nothing moves has no line.
+        let mut on = lines[usize::from(is_forward)].as_ref()?.project_all(&path(&piece));
+        on.iter_mut().for_each(|p| p.s_m += left * piece.sized.length_m);
+        Some(Placed { piece, is_forward, on })
+    });
     let mut placed: Vec<Placed> = placed.collect();
     about.seen.is_curved = !lines.iter().flatten().all(RoadLine::is_straight);
     about.seen.oncoming_left_m = oncoming_left_m(&lines, &placed);
@@ -80,7 +71,7 @@ pub(super) fn assemble(
             .flat_map(|of| (0..of.on.len()).step_by(stride).map(|k| (of.on[k].d_m, of.piece.samples.lane(k))))
             .collect();
         let Some((lane_lines_m, source)) = lane_lines(&laterals, preset.lanes.width_m) else { continue };
-        if source == BY_NAME && has(Role::LaneOffset) {
+        if source == BY_NAME {
             let difference = place_by_offset(&mut placed, side == 1, &lane_lines_m);
             about.seen.lane_offset_error_m = difference.or(about.seen.lane_offset_error_m);
         }
@@ -98,7 +89,7 @@ pub(super) fn assemble(
     }
     let file_frames = file_frames(&placed, raw.has_frames);
     about.seen.label_mismatch = label_mismatch(&placed, &carriageways, index);
-    about.seen.heading = if has_heading { compare_headings(&placed, &lines, rate_hz) } else { None };
+    about.seen.heading = compare_headings(&placed, &lines, rate_hz);
     let mut tracks: Vec<Track> = Vec::with_capacity(placed.len());
     // Each gives its memory to its track.
     for (of, id) in placed.into_iter().zip(ids) {
@@ -111,23 +102,15 @@ pub(super) fn assemble(
     let mut recording =
         Recording { id: raw.id, frame_rate_hz: rate_hz, carriageways, tracks, synthetic: raw.synthetic };
     about.judge(&mut recording, preset, place)?;
-    let (checksum_sha256, notes) = (file.checksums.clone(), Vec::new());
+    let (checksum_sha256, notes) = (raw.checksums, Vec::new());
     let loaded = Loaded { recording, checksum_sha256, notes, vehicle_names, file_frames };
     Ok(LoadedTracks { loaded, understanding: about })
 }
 
-/// Tells what columns and classes are taken for.
-fn describe_columns(about: &mut Understanding, raw: &RawRecording, preset: &Preset, file: &FileFacts) {
-    let of = |(role, column): &(Role, String)| match role.key() == column {
-        true => column.clone(),
-        false => format!("{} = {column}", role.key()),
-    };
-    let used = file.roles.iter().map(of).collect::<Vec<_>>().join(", ");
-    let unused = if file.unused.is_empty() { String::new() } else { format!("; not used: {}", file.unused.join(", ")) };
-    about.fact("columns", used + &unused);
-    about.fact("reference", format!("{:?}, as the preset says or assumes", preset.reference).to_lowercase());
+/// Tells what classes are taken for.
+fn describe_classes(about: &mut Understanding, raw: &RawRecording, preset: &Preset) {
     let mut classes: BTreeMap<&str, u64> = BTreeMap::new();
-    for class in raw.vehicles.iter().filter_map(|vehicle| vehicle.class.as_deref()) {
+    for class in raw.vehicles.iter().filter_map(|vehicle| vehicle.samples.class(&raw.classes)) {
         *classes.entry(class).or_default() += 1;
     }
     if !classes.is_empty() {
@@ -142,6 +125,9 @@ fn describe_columns(about: &mut Understanding, raw: &RawRecording, preset: &Pres
 /// Where the file gives the distance from the middle of the lane, it is more exact than the line of the road: d becomes the
 /// middle of the named lane plus that distance. Returns the median difference to d from the line.
 fn place_by_offset(placed: &mut [Placed], is_forward: bool, lines_m: &[f64]) -> Option<f64> {
+    if !placed.iter().any(|of| of.piece.samples.has(LANE_OFFSET)) {
+        return None;
+    }
     let lanes = Carriageway { name: String::new(), lane_lines_m: lines_m.to_vec() };
     // The lane that a name usually is.
     let mut laterals: Vec<Lateral> = placed
@@ -297,9 +283,9 @@ fn track(
     let lane = d_m.iter().map(|d| lanes.lane_at(*d).map_or(NO_LANE, |lane| lane as u16)).collect();
     Track {
         id,
-        class: of.sized.class,
-        length_m: of.sized.length_m,
-        width_m: of.sized.width_m,
+        class: of.piece.sized.class,
+        length_m: of.piece.sized.length_m,
+        width_m: of.piece.sized.width_m,
         carriageway,
         first_frame: of.piece.first_frame,
         s_m,
@@ -336,7 +322,7 @@ fn compare_headings(placed: &[Placed], lines: &[Option<RoadLine>; 2], rate_hz: f
     let stride = rate_hz.round().max(1.0) as usize;
     let mut cosines = Vec::new();
     let mut across = Comparison::default();
-    for of in placed {
+    for of in placed.iter().filter(|of| of.piece.samples.has(HEADING_X)) {
         let (samples, tangents) = (&of.piece.samples, of.tangents(lines));
         for k in (stride..of.on.len()).step_by(stride) {
             let (before, now) = (samples.xy_m(k - stride), samples.xy_m(k));

@@ -2,9 +2,8 @@
 
 use super::pieces::Piece;
 use super::preset::{Preset, Reference};
-use super::raw::RawVehicle;
 use super::road::{median, unit};
-use super::samples::{HEADING_X, HEADING_Y, Sample, X, Y};
+use super::samples::{HEADING_X, HEADING_Y, LENGTH, Sample, Samples, WIDTH, X, Y};
 use crate::trajectory::VehicleClass;
 
 /// Length and width where the file has none, m.
@@ -13,8 +12,8 @@ const USUAL_TRUCK_M: [f64; 2] = [12.0, 2.5];
 /// A vehicle of this length is a lorry if no class tells, m.
 const TRUCK_FROM_M: f64 = 7.0;
 
-pub(super) fn is_ignored(vehicle: &RawVehicle, preset: &Preset) -> bool {
-    vehicle.samples.len() == 0 || vehicle.class.as_ref().is_some_and(|class| begins_so(class, &preset.classes.ignored))
+pub(super) fn is_ignored(vehicle: &Samples, classes: &[String], preset: &Preset) -> bool {
+    vehicle.len() == 0 || vehicle.class(classes).is_some_and(|class| begins_so(class, &preset.classes.ignored))
 }
 
 pub(super) fn begins_so(class: &str, list: &[String]) -> bool {
@@ -31,11 +30,11 @@ pub(super) struct Sized {
     pub is_assumed: bool,
 }
 
-/// The box of a piece of a vehicle's track.
-pub(super) fn sized(piece: &Piece, vehicle: &RawVehicle, classes: &[String], preset: &Preset) -> Sized {
-    let mut sizes_m = vehicle.sizes_m(&piece.samples);
-    let class = vehicle.class_of(&piece.samples, classes);
-    let [length_m, width_m] = sizes_m.each_mut().map(|sizes| Some(median(sizes)).filter(|size| !size.is_nan()));
+/// The box of a piece of a vehicle's track; what its samples do not tell is that of all of the vehicle's.
+pub(super) fn sized(piece: &Samples, vehicle: &Samples, classes: &[String], preset: &Preset) -> Sized {
+    let class = piece.class(classes).or(vehicle.class(classes)).map_or("", String::as_str);
+    let size_m = |of: &Samples, column: usize| Some(median(&mut of.changes(column))).filter(|size| !size.is_nan());
+    let [length_m, width_m] = [LENGTH, WIDTH].map(|column| size_m(piece, column).or_else(|| size_m(vehicle, column)));
     let is_named_truck = begins_so(class, &preset.classes.truck);
     let is_long = |from_m: f64| length_m.is_some_and(|length_m| length_m >= from_m);
     let is_truck = match preset.classes.truck_from_m {
@@ -55,7 +54,8 @@ pub(super) fn sized(piece: &Piece, vehicle: &RawVehicle, classes: &[String], pre
 /// Moves the positions from the reference point to the middle of the box along the heading of each sample, or the last one
 /// before it. Returns what is left to do along the road, in lengths of the box, where the piece has no heading. `travel` is that
 /// of the recording.
-pub(super) fn centre(piece: &mut Piece, of: &Sized, preset: &Preset, travel: [f64; 2]) -> f64 {
+pub(super) fn centre(piece: &mut Piece, preset: &Preset, travel: [f64; 2]) -> f64 {
+    let of = &piece.sized;
     let along = match preset.reference {
         Reference::Centre => return 0.0,
         Reference::Front => -0.5,

@@ -2,16 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use super::boxes::Sized;
 use super::pieces::Piece;
 use super::preset::{Preset, RoadSource};
-use super::raw::RawRecording;
 use super::road::{OnRoad, Path, RoadLine, dot, median};
 
 /// A piece on its carriageway.
 pub(super) struct Placed {
     pub piece: Piece,
-    pub sized: Sized,
     pub is_forward: bool,
     pub on: Vec<OnRoad>,
 }
@@ -28,13 +25,7 @@ const REACH_M: f64 = 8.0;
 const RASTER_M: f64 = 0.25;
 
 /// The lines of the backward and forward carriageway, and whether each piece belongs to the forward one.
-pub(super) fn road(
-    pieces: &[Piece],
-    raw: &RawRecording,
-    preset: &Preset,
-    rate_hz: f64,
-) -> Option<([Option<RoadLine>; 2], Vec<bool>)> {
-    let given = |piece: &Piece| raw.vehicles[piece.vehicle].direction;
+pub(super) fn road(pieces: &[Piece], preset: &Preset, rate_hz: f64) -> Option<([Option<RoadLine>; 2], Vec<bool>)> {
     let along = match preset.road {
         RoadSource::X => Some([1.0, 0.0]),
         RoadSource::Y => Some([0.0, 1.0]),
@@ -47,8 +38,8 @@ pub(super) fn road(
     };
     if let Some(along) = along {
         let line = RoadLine::straight([0.0; 2], along);
-        let is_forward = |piece: &Piece| given(piece).unwrap_or_else(|| dot(along, piece.travel_m())) >= 0.0;
-        let forward = settled(pieces, &pieces.iter().map(is_forward).collect::<Vec<_>>(), &line, given, path);
+        let is_forward = |piece: &Piece| piece.direction.unwrap_or_else(|| dot(along, piece.travel_m())) >= 0.0;
+        let forward = settled(pieces, &pieces.iter().map(is_forward).collect::<Vec<_>>(), &line, path);
         return Some(([Some(line.reversed()), Some(line)], forward));
     }
     let size = |piece: &Piece| libm::hypot(piece.travel_m()[0], piece.travel_m()[1]);
@@ -62,12 +53,12 @@ pub(super) fn road(
         first.project(b).s_m - first.project(a).s_m
     };
     let mut forward: Vec<bool> =
-        pieces.iter().map(|piece| given(piece).unwrap_or_else(|| gain(piece)) >= 0.0).collect();
+        pieces.iter().map(|piece| piece.direction.unwrap_or_else(|| gain(piece)) >= 0.0).collect();
     // Forward is towards +x, or +y on a road along y.
     let travel = longest.travel_m();
     let leads = if travel[0].abs() > 0.2 * travel[1].abs() { travel[0] } else { travel[1] };
     let longest_is_forward = gain(longest) >= 0.0;
-    if (leads >= 0.0) != longest_is_forward && raw.vehicles.iter().all(|vehicle| vehicle.direction.is_none()) {
+    if (leads >= 0.0) != longest_is_forward && pieces.iter().all(|piece| piece.direction.is_none()) {
         forward.iter_mut().for_each(|is| *is = !*is);
     }
     let line = |forward: &[bool], is_forward: bool| {
@@ -84,7 +75,7 @@ pub(super) fn road(
     };
     let of_most =
         if driven(true) < driven(false) { lines[0].as_ref().map(RoadLine::reversed) } else { lines[1].clone() };
-    let settled = settled(pieces, &forward, &of_most?, given, path);
+    let settled = settled(pieces, &forward, &of_most?, path);
     if settled != forward {
         lines = [false, true].map(|side| line(&settled, side));
     }
@@ -100,13 +91,7 @@ pub(super) fn road(
 /// The directions of pieces that first have those of their travel. What stands, or reverses, is of the direction in which most
 /// metres are driven where it is across the road: nothing is a carriageway within the lanes of another. A heading, if most of
 /// them fit the travel, tells more than these where few metres are driven.
-fn settled(
-    pieces: &[Piece],
-    forward: &[bool],
-    line: &RoadLine,
-    given: impl Fn(&Piece) -> Option<f64>,
-    path: impl Fn(&Piece) -> Path,
-) -> Vec<bool> {
+fn settled(pieces: &[Piece], forward: &[bool], line: &RoadLine, path: impl Fn(&Piece) -> Path) -> Vec<bool> {
     let paths: Vec<Vec<OnRoad>> = pieces.iter().map(|piece| line.project_all(&path(piece))).collect();
     let heading = |(piece, forward): (&Piece, &bool)| {
         let along = line.directions(&[piece.samples.xy_m(0)])[0];
@@ -117,7 +102,7 @@ fn settled(
     let headings: Vec<Option<(bool, bool)>> = pieces.iter().zip(forward).map(heading).collect();
     let known = || headings.iter().flatten();
     let is_trusted = 10 * known().filter(|(_, fits)| *fits).count() > 9 * known().count();
-    let by_heading = |k: usize| headings[k].filter(|_| is_trusted && given(&pieces[k]).is_none()).map(|(is, _)| is);
+    let by_heading = |k: usize| headings[k].filter(|_| is_trusted && pieces[k].direction.is_none()).map(|(is, _)| is);
     let first: Vec<bool> = (0..pieces.len()).map(|k| by_heading(k).unwrap_or(forward[k])).collect();
     let cell = |on: &OnRoad| (on.d_m / RASTER_M).floor() as i64;
     let mut driven_m: BTreeMap<i64, [f64; 2]> = BTreeMap::new();
@@ -142,7 +127,7 @@ fn settled(
             sum / paths[k].len() as f64
         });
         let least_m: f64 = if by_heading(k).is_some() { 1.0 } else { 0.0 };
-        first[k] != (given(&pieces[k]).is_none() && other_m > least_m.max(2.0 * own_m))
+        first[k] != (pieces[k].direction.is_none() && other_m > least_m.max(2.0 * own_m))
     };
     (0..pieces.len()).map(settle).collect()
 }

@@ -170,7 +170,7 @@ pub struct LoadedTracks {
 /// # Errors
 /// [`Error::Io`]; [`Error::Input`] for a value that is none, with file, row and column, or for a file without vehicles.
 pub fn read_tracks(file: &TrackFile, preset: &Preset) -> Result<Vec<LoadedTracks>> {
-    let (recordings, facts) = raw::read_table(file, preset)?;
+    let recordings = raw::read_table(file, preset)?;
     let place = Place::file(&file.path);
     if recordings.iter().all(|recording| recording.vehicles.is_empty()) {
         return Err(Error::input(place, "there is no vehicle", "check that this is the file with the tracks"));
@@ -179,7 +179,7 @@ pub fn read_tracks(file: &TrackFile, preset: &Preset) -> Result<Vec<LoadedTracks
     let read = |mut recording: RawRecording| {
         recording.synthetic = synthetic || recording.id.contains(SYNTHETIC);
         let place = place.clone().of(format!("recording {}", recording.id));
-        assemble::assemble(recording, preset, &facts, &place)
+        assemble::assemble(recording, preset, &place)
     };
     recordings.into_iter().map(read).collect()
 }

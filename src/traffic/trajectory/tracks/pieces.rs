@@ -2,10 +2,11 @@
 
 use std::borrow::Cow;
 
+use super::boxes::{Sized, sized};
 use super::preset::Preset;
 use super::raw::{RawRecording, RawVehicle};
 use super::road::{cross, dot, median, range, unit};
-use super::samples::{AT, OTHER_CLOCK, Sample, Samples, X, Y, between};
+use super::samples::{AT, DIRECTION, OTHER_CLOCK, Sample, Samples, X, Y, between};
 use super::understanding::Understanding;
 use lanesweep_support::readable::{significant, value};
 use lanesweep_support::{Error, Place, Result};
@@ -35,6 +36,9 @@ pub(super) struct Piece {
     pub vehicle: usize,
     pub first_frame: i64,
     pub samples: Samples,
+    pub sized: Sized,
+    /// Sign of the travel along the road, if the file has it.
+    pub direction: Option<f64>,
 }
 
 impl Piece {
@@ -96,8 +100,11 @@ pub(super) fn pieces(
                 short += 1;
                 continue;
             }
-            let samples = if is_whole { std::mem::take(&mut stored) } else { at_frames.iter().collect() };
-            pieces.push(Piece { vehicle, first_frame, samples });
+            let direction = Some(stored.of(DIRECTION, 0)).filter(|sign| !sign.is_nan());
+            let part = (!is_whole).then(|| at_frames.iter().collect());
+            let sized = sized(part.as_ref().unwrap_or(&stored), &stored, &raw.classes, preset);
+            let samples = part.unwrap_or_else(|| std::mem::take(&mut stored));
+            pieces.push(Piece { vehicle, first_frame, samples, sized, direction });
         }
     }
     let gaps = pieces.len().saturating_sub(vehicles + jumps);

@@ -1,5 +1,6 @@
 //! What a track file says: vehicles with samples in SI units and right-handed axes, before any road is known.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 
 use super::TrackFile;
@@ -29,46 +30,7 @@ const HALF_A_DAY_S: f64 = 43_200.0;
 pub(super) struct RawVehicle {
     /// Its id in the file.
     pub key: String,
-    pub class: Option<String>,
-    /// The lengths and widths that it has, m; each change is one more.
-    pub sizes_m: [Vec<f64>; 2],
-    /// Sign of the travel along the road.
-    pub direction: Option<f64>,
     pub samples: Samples,
-}
-
-impl RawVehicle {
-    /// A vehicle with the sizes, and the class and direction of its first row.
-    fn of_rows(key: String, samples: Samples, classes: &[String]) -> RawVehicle {
-        let class = class_of_first(&samples, classes).cloned();
-        let direction = Some(samples.of(DIRECTION, 0)).filter(|sign| !sign.is_nan());
-        let sizes_m = [LENGTH, WIDTH].map(|column| samples.changes(column));
-        RawVehicle { key, class, sizes_m, direction, samples }
-    }
-
-    /// Lengths and widths of some of its samples, m; all of them if these have none in their rows.
-    pub(super) fn sizes_m(&self, samples: &Samples) -> [Vec<f64>; 2] {
-        std::array::from_fn(|at| {
-            let all = &self.sizes_m[at];
-            let own = if all.len() > 1 { samples.changes([LENGTH, WIDTH][at]) } else { Vec::new() };
-            if own.is_empty() { all.clone() } else { own }
-        })
-    }
-
-    /// Class of some of its samples: that of the first.
-    pub(super) fn class_of<'a>(&'a self, samples: &Samples, classes: &'a [String]) -> &'a str {
-        class_of_first(samples, classes).or(self.class.as_ref()).map_or("", String::as_str)
-    }
-
-    /// Some of its samples as a vehicle of their own.
-    pub(super) fn part(&self, samples: Samples, classes: &[String]) -> RawVehicle {
-        let sizes_m = self.sizes_m(&samples);
-        RawVehicle { sizes_m, ..RawVehicle::of_rows(self.key.clone(), samples, classes) }
-    }
-}
-
-fn class_of_first<'a>(samples: &Samples, classes: &'a [String]) -> Option<&'a String> {
-    classes.get(number(samples.of(CLASS, 0))? as usize)
 }
 
 /// One recording.
@@ -88,29 +50,20 @@ pub(super) struct RawRecording {
     pub synthetic: bool,
     /// What was assumed of it.
     pub notes: Vec<String>,
-}
-
-/// A file, and its meta files.
-pub(super) struct FileFacts {
+    /// What the columns of its file are taken for.
+    pub columns: String,
+    /// Its file and the meta files.
     pub checksums: Vec<FileChecksum>,
-    /// Roles that the file has, with their columns.
-    pub roles: Vec<(Role, String)>,
-    /// Columns without a role.
-    pub unused: Vec<String>,
 }
 
 /// Reads a table of samples with its meta files.
 ///
 /// # Errors
 /// Those of the files, with the place of a bad value.
-pub(super) fn read_table(file: &TrackFile, preset: &Preset) -> Result<(Vec<RawRecording>, FileFacts)> {
+pub(super) fn read_table(file: &TrackFile, preset: &Preset) -> Result<Vec<RawRecording>> {
     let rows = Rows::open(&file.path)?;
     let columns = Columns::of(&preset.columns, rows.header(), &preset.none);
     check_columns(&rows, &columns, preset)?;
-    let present = Role::ALL.into_iter().filter(|role| columns.has(*role));
-    let mut roles: Vec<(Role, String)> = present.map(|role| (role, columns.name(role).to_owned())).collect();
-    let is_used = |name: &&String| roles.iter().any(|(_, used)| used == *name);
-    let unused = rows.header().iter().filter(|name| !is_used(name)).cloned().collect();
     // Times tell the rate too.
     let has_frames = columns.has(Role::Frame)
         && (preset.frame_rate_hz.is_some() || preset.recording.is_some() || !columns.has(Role::Time));
@@ -127,21 +80,15 @@ pub(super) fn read_table(file: &TrackFile, preset: &Preset) -> Result<(Vec<RawRe
         ));
     }
     recordings.retain(|recording| !recording.vehicles.is_empty());
-    if let Some(found) = columns.found_time() {
-        roles.iter_mut().filter(|(role, _)| *role == Role::Time).for_each(|(_, name)| *name += &format!(" ({found})"));
-    }
-    for RawRecording { vehicles, classes, .. } in &mut recordings {
-        for vehicle in vehicles {
-            let RawVehicle { key, mut samples, .. } = std::mem::take(vehicle);
-            samples.shrink();
-            *vehicle = RawVehicle::of_rows(key, samples, classes);
-        }
-    }
+    recordings.iter_mut().flat_map(|of| &mut of.vehicles).for_each(|vehicle| vehicle.samples.shrink());
     let mut checksums = vec![checksum];
     checksums.extend(add_frame_rate(file, preset, &mut recordings)?);
     let mut recordings = apart(recordings, preset);
     checksums.extend(add_vehicle_facts(file, preset, &mut recordings)?);
-    Ok((recordings, FileFacts { checksums, roles, unused }))
+    for recording in &mut recordings {
+        (recording.columns, recording.checksums) = (columns.describe(), checksums.clone());
+    }
+    Ok(recordings)
 }
 
 fn check_columns(rows: &Rows, columns: &Columns, preset: &Preset) -> Result<()> {
@@ -311,35 +258,37 @@ fn add_vehicle_facts(
     recordings: &mut [RawRecording],
 ) -> Result<Option<FileChecksum>> {
     let Some(meta) = &preset.vehicles else { return Ok(None) };
-    let mut facts: HashMap<String, RawVehicle> = HashMap::new();
+    type Facts = (Option<String>, [(usize, Option<f64>); 3]);
+    let mut facts: HashMap<String, Facts> = HashMap::new();
     let checksum = read_meta(file, meta, preset, |row| {
         let Some(key) = row.text(Role::Vehicle) else { return Ok(()) };
-        let size = |role| Ok(row.number(role)?.filter(|size| *size > 0.0).into_iter().collect());
-        let vehicle = RawVehicle {
-            key: key.to_string(),
-            class: row.text(Role::Class).map(|class| class.into_owned()),
-            sizes_m: [size(Role::Length)?, size(Role::Width)?],
-            direction: row.number(Role::Direction)?,
-            ..RawVehicle::default()
-        };
-        facts.insert(vehicle.key.clone(), vehicle);
+        let [length, width] =
+            [row.number(Role::Length)?, row.number(Role::Width)?].map(|size| size.filter(|size| *size > 0.0));
+        let numbers = [(LENGTH, length), (WIDTH, width), (DIRECTION, row.number(Role::Direction)?)];
+        facts.insert(key.into_owned(), (row.text(Role::Class).map(Cow::into_owned), numbers));
         Ok(())
     })?;
     // Programs write `00001`, `1` and `1.0` for one number.
     let number = |key: &str| key.parse::<f64>().ok().filter(|number| number.fract() == 0.0).map(f64::to_bits);
-    let by_number: HashMap<u64, &RawVehicle> = facts.iter().filter_map(|(key, of)| Some((number(key)?, of))).collect();
+    let by_number: HashMap<u64, &Facts> = facts.iter().filter_map(|(key, of)| Some((number(key)?, of))).collect();
     for recording in recordings {
         let mut unknown: Vec<&str> = Vec::new();
-        for vehicle in &mut recording.vehicles {
-            let known = facts.get(&vehicle.key).or_else(|| by_number.get(&number(&vehicle.key)?).copied());
-            let Some(known) = known else {
-                unknown.push(&vehicle.key);
+        for RawVehicle { key, samples } in &mut recording.vehicles {
+            let known = facts.get(key).or_else(|| by_number.get(&number(key)?).copied());
+            let Some((class, numbers)) = known else {
+                unknown.push(key);
                 continue;
             };
-            vehicle.class = vehicle.class.take().or_else(|| known.class.clone());
-            vehicle.direction = vehicle.direction.or(known.direction);
-            for (own, known) in vehicle.sizes_m.iter_mut().zip(&known.sizes_m).filter(|(own, _)| own.is_empty()) {
-                own.clone_from(known);
+            let classes = &mut recording.classes;
+            let class = class.as_ref().map(|class| {
+                let at = classes.iter().position(|known| known == class).unwrap_or_else(|| {
+                    classes.push(class.clone());
+                    classes.len() - 1
+                });
+                at as f64
+            });
+            for (column, value) in numbers.iter().copied().chain([(CLASS, class)]) {
+                value.into_iter().for_each(|value| samples.fill(column, value));
             }
         }
         if let Some(first) = unknown.first() {

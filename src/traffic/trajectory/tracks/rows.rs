@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use super::is_parquet;
 use super::roles::{ColumnName, Role};
 use super::times::{FoundTime, time_of_text, unit_of_time};
-use crate::trajectory::csv_table::{CsvColumn, CsvFormat, CsvTable, FileChecksum};
+use crate::trajectory::csv_table::{CsvTable, FileChecksum};
 use crate::trajectory::number;
 use lanesweep_support::table::{Cell as TableCell, TableFormat, TableReader};
 use lanesweep_support::{Error, Place, Result};
@@ -65,6 +65,23 @@ impl Columns {
     /// What times without a unit were found to be.
     pub(super) fn found_time(&self) -> Option<FoundTime> {
         self.found_time.get()
+    }
+
+    /// The columns with their roles, and those that are not used, in words.
+    pub(super) fn describe(&self) -> String {
+        let present = || Role::ALL.into_iter().filter(|role| self.has(*role));
+        let of = |role: Role| {
+            let (key, name) = (role.key(), self.name(role));
+            match self.found_time().filter(|_| role == Role::Time) {
+                Some(found) => format!("{key} = {name} ({found})"),
+                None if key == name => name.to_owned(),
+                None => format!("{key} = {name}"),
+            }
+        };
+        let used = present().map(of).collect::<Vec<_>>().join(", ");
+        let is_unused = |name: &&String| present().all(|role| self.name(role) != *name);
+        let unused: Vec<&str> = self.names.iter().filter(is_unused).map(String::as_str).collect();
+        if unused.is_empty() { used } else { format!("{used}; not used: {}", unused.join(", ")) }
     }
 
     pub(super) fn has(&self, role: Role) -> bool {
@@ -133,7 +150,7 @@ impl Rows {
                 (reader.columns().to_vec(), RowSource::Parquet(Box::new(reader)))
             }
             false => {
-                let table = CsvTable::open(path, CsvFormat { name: "expected", header: "", delimiter: None })?;
+                let table = CsvTable::open(path, "")?;
                 (table.header().to_vec(), RowSource::Text(Box::new(table)))
             }
         };
@@ -220,7 +237,7 @@ impl SampleRow<'_> {
     fn cell(&self, role: Role) -> TableCell<'_> {
         let Some((at, _)) = self.columns.at[role as usize] else { return TableCell::Null };
         match &self.source {
-            Line::Text(table) => TableCell::Text(String::from_utf8_lossy(first_of(table.bytes(CsvColumn(at))))),
+            Line::Text(table) => TableCell::Text(String::from_utf8_lossy(first_of(table.bytes(at)))),
             Line::Parquet { reader, order, .. } => match reader.rows.cell(order[role as usize]) {
                 TableCell::Text(Cow::Borrowed(text)) => TableCell::Text(Cow::Borrowed(text.trim())),
                 cell => cell,
@@ -234,9 +251,9 @@ impl SampleRow<'_> {
         // Most values, without a text.
         if let (Line::Text(table), Some((at, _))) = (&self.source, self.columns.at[role as usize])
             && !table.has_decimal_commas()
-            && let Some(value) = number::short_decimal(table.bytes(CsvColumn(at)))
+            && let Some(value) = number::short_decimal(table.bytes(at))
         {
-            return si(value, &|| String::from_utf8_lossy(table.bytes(CsvColumn(at))).into_owned());
+            return si(value, &|| String::from_utf8_lossy(table.bytes(at)).into_owned());
         }
         match self.cell(role) {
             TableCell::Text(text) => self.number_of(&text, role),

@@ -111,6 +111,23 @@ impl Samples {
         values
     }
 
+    /// Whether a column has a known value.
+    pub(super) fn has(&self, column: usize) -> bool {
+        self.columns[column].iter().any(|value| !value.is_nan())
+    }
+
+    /// Gives a column without known values this one everywhere.
+    pub(super) fn fill(&mut self, column: usize, value: f64) {
+        if !self.has(column) {
+            self.columns[column] = vec![value];
+        }
+    }
+
+    /// The name of the class of the first sample.
+    pub(super) fn class<'a>(&self, classes: &'a [String]) -> Option<&'a String> {
+        classes.get(number(self.of(CLASS, 0))? as usize)
+    }
+
     /// Gives back the memory that no value needs.
     pub(super) fn shrink(&mut self) {
         self.columns.iter_mut().for_each(Vec::shrink_to_fit);
