@@ -1,7 +1,5 @@
 //! `verify`, `--backend` and `--device` as their users type them.
 
-use std::path::Path;
-
 use crate::common::device::software_device;
 use crate::common::program::{files, json, ran, said, same, without_host};
 
@@ -33,12 +31,6 @@ fn a_study_on_a_device_writes_the_same_files_as_on_the_cpu() {
     assert_eq!((&record["device"]["exact_path"], &record["sweep"]["redone_lanes"]), (&true.into(), &0.into()));
     let (lanes, rechecked) = (record["lanes"].as_u64(), record["sweep"]["rechecked_lanes"].as_u64());
     assert!(rechecked.unwrap() >= lanes.unwrap() / 1000, "{record}");
-}
-
-#[test]
-fn the_cpu_backend_can_be_verified_without_any_device() {
-    let verify = "-q verify --backend cpu --random-lanes 400 --config verify.threshold_units=1";
-    assert!(ran(Path::new("."), &format!("{verify} {SMALL}")).contains("Under test: CPU"));
 }
 
 #[test]

@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 
 use crate::common::program::PROGRAM;
 use crate::common::skipped;
-use crate::program::shell::verbs_of;
+use crate::program::command_line::verbs_of;
 
 /// A configuration with fewer recordings.
 fn fewer_recordings() -> &'static Path {

@@ -2,7 +2,7 @@
 
 use crate::common::dice::cases;
 use crate::common::lane_sets::run_case;
-use crate::common::program::{self, files, json, ran, refused, table};
+use crate::common::program::{self, files, json, ran, table};
 
 use lanesweep::engine::{CpuBackend, Executor, Headway, Start, Verdicts};
 use lanesweep::model::criterion::Criterion;
@@ -320,53 +320,6 @@ fn the_page_has_the_outcome_of_every_cell_and_stays_small() {
             let own = rows.iter().filter(|row| grid["name"] == *row["map"] && *model == *row["model"]);
             assert_eq!(words, own.map(|row| row["outcome"].as_str()).collect::<Vec<_>>(), "{model}");
         }
-    }
-}
-
-#[test]
-fn what_makes_no_map_is_answered_with_what_would() {
-    // X, Y and S: good axes and the speed of the ego.
-    let good =
-        [("X", "--x gap_m=1..60/1"), ("Y", "--y lateral_speed_mps=0.1..1.7/0.1"), ("S", "--set ego_speed_kmh=90")];
-    let dir = tempfile::tempdir().unwrap();
-    for (flags, hint) in [
-        ("--x gap_m=1..60/0 Y S", "a step of 0"),
-        ("--x gap_m=3,2 Y S", "rising order"),
-        ("--x ahead_gap_m=1..60/1 Y S", "there is no parameter of cut-ins"),
-        ("--x gap_m=1..60/0.00001 Y S", "longer step"),
-        ("--x gap_m=0..9999/0.2 --y lateral_speed_mps=0.1..1.7/0.01 S", "longer steps or fewer"),
-        ("--x gap_m=-5..60/1 Y S", "at least 0"),
-        ("--x lateral_speed_mps=1..2/1 Y S", "say the same twice"),
-        ("X Y --panel ego_speed_kmh=1..300/0.1", "2991 panels"),
-        ("X --y thw_s=1..2/1 S --set lateral_speed_mps=1", "given twice"),
-        ("X Y --set ego_speed_kmh=90,100", "has 2 values"),
-        ("X Y S --set other_speed_kmh=100 --config map.closing=true", "in no panel"),
-        ("X Y S --config map.closing=true", "must be the panel's or fixed"),
-        ("X Y S --config map.reference=true --backend gpu", "binary64"),
-    ] {
-        let flags = good.iter().fold(flags.to_owned(), |flags, (short, long)| flags.replace(short, long));
-        refused(dir.path(), &format!("map cut-in --out . {flags}"), 2, hint);
-    }
-    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
-}
-
-/// What the sheet of one case says, the map says of its cell.
-#[test]
-fn sizes_that_no_vehicle_has_are_reported() {
-    let dir = tempfile::tempdir().unwrap();
-    let map = "map lvd --x gap_m=10,20 --y ego_speed_mps=10,20 --set deceleration_mps2=1 --out map";
-    for (set, expected) in [
-        ("--set width_m=3.5", "an implausible vehicle width is used as it is, once: width_m: 3.5 m"),
-        (
-            "--panel length_m=1.8,4",
-            "vehicle length is used as it is, 4 times, first: cell 0, length: 1.8 m, but the width is 1.9 m",
-        ),
-    ] {
-        let (code, text) = program::said(dir.path(), &format!("{map} {set}"));
-        assert!(
-            code == 0 && text.contains(expected) && (text.contains("implausible") != expected.is_empty()),
-            "{text}"
-        );
     }
 }
 

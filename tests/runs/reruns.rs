@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::common::mined::scenarios_of;
 use crate::common::plans::mixed;
-use crate::common::program::{json, lanesweep, ran, refused, table, words};
+use crate::common::program::{json, lanesweep, ran, table, words};
 use lanesweep::Place;
 use lanesweep::engine::{Backend, CpuBackend, LanePlan, LaneRunner, Outcome, Wanted, words as bits};
 use lanesweep::model::profile::Profile;
@@ -115,53 +115,4 @@ fn a_rerun_takes_profile_time_step_options_and_arithmetic_from_the_run() {
             compare_with_row(dir, out, &table[drawn(index, table.len() as u64) as usize], out == "wide");
         }
     }
-}
-
-#[test]
-fn a_lane_of_a_run_in_parts_can_be_looked_at_before_and_after_the_merge() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    let table = study(dir, "--backend cpu --out whole");
-    let parts = format!("{STUDY} --backend cpu --out parts --shard");
-    let trace = |from: &str, lane: &str| lanesweep(dir, &words(&format!("simulate --from {from} --lane {lane}")));
-    let key = key_of(&table[table.len() / 2]);
-    let of_whole = trace("whole", &key);
-    assert_eq!(of_whole.0, 0, "{}", of_whole.2);
-    ran(dir, &format!("{parts} 0/2"));
-    assert_eq!(trace("parts", &key), of_whole);
-    ran(dir, &format!("{parts} 1/2"));
-    ran(dir, "-q merge parts");
-    assert_eq!(trace("parts", &key), of_whole);
-    // A sampling run's parts as well.
-    ran(dir, "-q fit --synth-recordings 3 --categories cut-in --parameterizations 2 --out densities");
-    let sample = "-q sample densities/cut-in-2.json --samples 3000 --thw 0.6 --backend cpu --out";
-    ran(dir, &format!("{sample} sampled"));
-    ran(dir, &format!("{sample} shard --shard 1/2"));
-    let of_whole = trace("sampled", "#77/2/0.6s/FSM --models all");
-    assert!(of_whole.0 == 0 && trace("shard", "#77/2/0.6s/FSM --models all") == of_whole, "{}", of_whole.2);
-}
-
-#[test]
-fn a_folder_without_its_plan_says_how_to_make_it() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    let table = study(dir, "--backend cpu --out r --config study.keep_plan=never");
-    assert!(!dir.join("r/run-plan.json").exists());
-    let rerun = format!("simulate --from r --lane {}", key_of(&table[0]));
-    refused(dir, &rerun, 3, "there is no plan of its lanes beside it");
-    refused(dir, &rerun.replace("from r", "from ."), 3, "there is no run here");
-    // Another study's plan is not taken for it; its own, made later, is; a damaged one is refused.
-    let plan = |dt: &str| {
-        ran(dir, &format!("{STUDY} --backend cpu --dt {dt} --plan-only --out p{dt}"));
-        std::fs::read(dir.join(format!("p{dt}/plan.json"))).unwrap()
-    };
-    std::fs::write(dir.join("r/plan.json"), plan("0.08")).unwrap();
-    refused(dir, &rerun, 3, "is not the plan that it records");
-    let mut own = plan("0.04");
-    std::fs::write(dir.join("r/plan.json"), &own).unwrap();
-    ran(dir, &rerun);
-    let middle = own.len() / 2;
-    own[middle] ^= 1;
-    std::fs::write(dir.join("r/plan.json"), own).unwrap();
-    refused(dir, &rerun, 3, "plan.json");
 }

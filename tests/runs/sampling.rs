@@ -8,13 +8,13 @@ use crate::common::{self, program};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use lanesweep::engine::{Backend, CpuBackend, Executor, Headway, LanePlan, SampleTally, Wanted};
+use lanesweep::engine::{CpuBackend, Executor, Headway};
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::{MODELS, ModelId};
 use lanesweep::model::profile::Profile;
-use lanesweep::run::sampling::{Estimator, Sample, SampleHeadways, SampleOptions, plan_samples};
+use lanesweep::run::sampling::{Estimator, Sample, SampleHeadways, SampleOptions};
 use lanesweep::scenario::{Category, Driven};
-use lanesweep::stats::density::{Bandwidth, DensityModel, Exposure, Kde, read_density, write_density};
+use lanesweep::stats::density::{Bandwidth, DensityModel, Exposure, Kde, write_density};
 use lanesweep::stats::estimate::Search;
 
 fn density(category: Category, key: &str) -> DensityModel {
@@ -26,51 +26,6 @@ fn folder() -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     write_density(&dir.path().join("density.json"), &density(Category::CutIn, "2")).unwrap();
     dir
-}
-
-fn options_of(samples: u64) -> SampleOptions {
-    let headways = SampleHeadways::Each(vec![Headway::ThwS(1.0), Headway::ThwS(0.4)]);
-    SampleOptions { seed: 5, ..SampleOptions::new(Estimator::Crude, samples, headways) }
-}
-
-fn plan(density: &DensityModel, samples: u64, profile: &Profile) -> LanePlan {
-    plan_samples(density, profile, &options_of(samples)).unwrap()
-}
-
-/// Counts in chunks that end at these samples, joined in the order given.
-fn tally(plan: &LanePlan, backend: &dyn Backend, ranges: &[(u64, u64)]) -> SampleTally {
-    let mut session = backend.prepare(plan).unwrap();
-    ranges.iter().fold(SampleTally::empty(plan), |all, &(from, to)| {
-        let chunk = session.run(from..to, Wanted::Counts).unwrap();
-        all.merge(SampleTally::of_chunk(plan, &chunk).unwrap()).unwrap()
-    })
-}
-
-#[test]
-fn counts_are_the_same_however_a_run_is_cut_up() {
-    let (n, profile, cpu) = (3700, Profile::load("paper").unwrap(), CpuBackend::lane_arithmetic());
-    let plan = plan(&density(Category::CutIn, "2"), n, &profile);
-    let whole = tally(&plan, &cpu, &[(0, n)]);
-    assert!(whole.failures.iter().sum::<u64>() > 0);
-    let of_37: Vec<(u64, u64)> = (0..37).map(|k| (100 * k, 100 * (k + 1))).collect();
-    let backwards: Vec<(u64, u64)> = of_37.iter().rev().copied().collect();
-    for ranges in [&of_37, &backwards, &vec![(1234, n), (0, 1), (1, 1234)]] {
-        assert!(whole == tally(&plan, &cpu, ranges), "{} chunks", ranges.len());
-    }
-    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    assert!(whole == one.install(|| tally(&plan, &cpu, &of_37)), "one thread");
-}
-
-#[test]
-fn parts_of_different_runs_and_doubled_parts_do_not_join() {
-    let profile = Profile::load("paper").unwrap();
-    let density = density(Category::CutIn, "2");
-    let (one, other) = (plan(&density, 500, &profile), plan(&density, 501, &profile));
-    let cpu = CpuBackend::lane_arithmetic();
-    let part = |plan: &LanePlan, from, to| tally(plan, &cpu, &[(from, to)]);
-    assert!(part(&one, 0, 100).merge(part(&other, 100, 200)).is_err(), "two runs");
-    let error = part(&one, 0, 100).merge(part(&one, 99, 200)).unwrap_err().to_string();
-    assert!(error.contains("samples 99 to 99 are in both"), "{error}");
 }
 
 /// The first `limit` failing rows of each model and criterion, as lines of the table.
@@ -373,33 +328,4 @@ fn draws_of_a_proposal_tell_their_scenarios_by_the_kernels_that_explain_them() {
     assert!(carriers(&crude).contains(&carriers(&rows[0])[0]), "{crude} {}", rows[0]);
     let few = estimated(dir.path(), "nine.json", how).0["estimates"][0].clone();
     assert!(few["estimate"]["trust"]["warnings"].to_string().contains("few_scenarios"), "{few}");
-}
-
-#[test]
-fn bad_input_is_told_with_its_place_and_what_to_do() {
-    let dir = folder();
-    let dir = dir.path();
-    write_density(&dir.join("cut-out.json"), &density(Category::CutOut, "a")).unwrap();
-    let text = std::fs::read_to_string(dir.join("density.json")).unwrap();
-    let newer = text.replace("\"lanesweep_density\": 2", "\"lanesweep_density\": 3");
-    std::fs::write(dir.join("newer.json"), newer).unwrap();
-    std::fs::write(dir.join("cut.json"), &text[..text.len() / 2]).unwrap();
-    for (args, code, said) in [
-        ("@ --estimator is --samples 300000000000000", 2, "at least 1 and at most 281474976710655"),
-        ("@ --estimator is --time-limit 3", 2, "belongs to crude Monte Carlo"),
-        ("@ --samples 0", 2, "--samples: `0` cannot be used"),
-        ("@ --samples 2000000000000000000", 2, "more than can be counted"),
-        ("@ --thw -1", 2, "not a time headway"),
-        ("@ --thw sampled", 2, "--with-thw"),
-        ("@ --shard 5/5", 2, "no shard 5 of 5"),
-        ("@ --shard 0/2 --half-width 0.1", 2, "cannot evaluate a stop rule"),
-        ("@ --level 0.05", 2, "at least 0.5 and below 1"),
-        ("newer.json", 3, "version 2"),
-        ("cut.json", 3, "cut.json"),
-        ("@ --estimator is --thw 1 --proposal @", 3, "no proposal"),
-        ("cut-out.json --profile jrc-2021", 2, "exposure"),
-    ] {
-        refused(dir, &format!("sample {}", args.replace('@', "density.json")), code, said);
-    }
-    assert!(read_density(&dir.join("density.json")).is_ok());
 }

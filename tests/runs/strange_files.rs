@@ -3,109 +3,10 @@
 #![cfg(unix)]
 
 use crate::common::golden;
-use crate::common::program::{self, command, ran, unbroken, words};
+use crate::common::program::{self, ran, unbroken, words};
 
 use std::path::Path;
-use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
-
-/// No wait, no reading of much: an unloaded machine needs milliseconds.
-const AT_ONCE: Duration = Duration::from_secs(20);
-
-/// Exit code and stderr without the drawing; a program that does not end is an error.
-fn said(dir: &Path, args: &[&str]) -> (i32, String) {
-    let errors = dir.join("stderr.txt");
-    let mut command = command(dir, args);
-    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(std::fs::File::create(&errors).unwrap());
-    let mut child = command.spawn().unwrap();
-    let started = Instant::now();
-    while child.try_wait().unwrap().is_none() {
-        if started.elapsed() > AT_ONCE {
-            child.kill().unwrap();
-            child.wait().unwrap();
-            panic!("{args:?} did not end within {AT_ONCE:?}");
-        }
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    (child.wait().unwrap().code().unwrap_or(-1), unbroken(&std::fs::read(errors).unwrap()))
-}
-
-/// A command that ends at once, as one of bad data, and says all of this.
-fn refused(dir: &Path, line: &str, hints: &[&str]) {
-    let (code, said) = said(dir, &words(line));
-    assert!(code == 3 && hints.iter().all(|hint| said.contains(hint)), "{line}: {code}, expected {hints:?}: {said}");
-}
-
-fn pipe(path: &Path) {
-    assert!(Command::new("mkfifo").arg(path).status().unwrap().success());
-}
-
-/// A recording in the folder `in`.
-fn recording(dir: &Path) {
-    ran(dir, "-q tracks --convert in --synth-recordings 1 --config generator.duration_s=60");
-}
-
-/// The ways of reading a file, `@`: whole, line by line, as a table, in pieces.
-#[test]
-fn pipes_folders_and_devices_are_refused_at_once_wherever_a_file_is_read() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    ran(dir, "-q fit --synth-recordings 3 --categories cut-in --parameterizations 2 --out density.json");
-    pipe(&dir.join("a_pipe"));
-    std::fs::create_dir(dir.join("a_folder")).unwrap();
-    std::os::unix::fs::symlink("/dev/zero", dir.join("a_link")).unwrap();
-    for line in [
-        "study --scenarios @",
-        "study --config @",
-        "study --profile @",
-        "study --plan @",
-        "study --plan @ --shard 0/2",
-        "sample @",
-        "sample --plan @",
-        "sample density.json --estimator is --thw 0.6 --proposal @",
-        "simulate --case-file @",
-        "simulate --table @",
-    ] {
-        for file in ["a_pipe", "a_folder", "/dev/zero", "a_link"] {
-            let kind = if file == "a_folder" { "this is a folder" } else { "a pipe, a device or a socket" };
-            refused(dir, &line.replace('@', file), &[file, kind]);
-        }
-    }
-}
-
-#[test]
-fn a_line_that_does_not_end_is_given_up_and_named() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    recording(dir);
-    let tracks = dir.join("in/01_tracks.csv");
-    let mut header = std::fs::read(&tracks).unwrap();
-    header.truncate(header.iter().position(|&byte| byte == b'\n').unwrap() + 1);
-    // Digits, an open quotation mark, zero bytes.
-    for (begin, piece, hint) in [("", &b"7"[..], ""), ("\"", b"7,\n", "quotation mark"), ("", b"\0", "")] {
-        let endless = piece.iter().copied().cycle().take(32 << 20).collect::<Vec<u8>>();
-        std::fs::write(&tracks, [&header[..], begin.as_bytes(), &endless].concat()).unwrap();
-        refused(dir, "mine in", &["01_tracks.csv, line", "within 1 MiB", hint]);
-    }
-}
-
-/// Without a byte on the disk.
-#[test]
-fn files_beyond_what_their_kind_can_be_are_not_read_to_their_end_nor_is_what_is_not_text() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    for name in ["huge", "huge.jsonl"] {
-        std::fs::File::create(dir.join(name)).unwrap().set_len(1 << 40).unwrap();
-    }
-    std::fs::write(dir.join("not_utf8"), b"a = \xff\xfe\n").unwrap();
-    refused(dir, "study --scenarios huge.jsonl", &["huge.jsonl, line 1: the line is longer than"]);
-    for line in ["study --config", "study --profile", "simulate --case-file", "simulate --table"] {
-        // A table is read row by row, so it may be of any size, but a row may not.
-        let why = if line.contains("table") { "a row is longer than" } else { "larger than any file of this kind" };
-        refused(dir, &format!("{line} huge"), &["huge", why]);
-        refused(dir, &format!("{line} not_utf8"), &["not_utf8, line 1: not UTF-8 text"]);
-    }
-}
 
 /// Of a file of 1 GiB the beginning and the end are looked at: memory for its content is not there.
 #[test]
@@ -226,14 +127,4 @@ fn a_table_for_spreadsheets_begins_no_formula_with_foreign_text_and_reads_back_t
         std::fs::write(dir.join("cases.csv"), row).unwrap();
         ran(dir, &format!("simulate --scenarios cases.csv --lane={id}/S/1.2s/FSM"));
     }
-}
-
-#[test]
-fn a_command_that_is_suggested_can_be_pasted_whatever_the_folder_is_called() {
-    let dir = tempfile::tempdir().unwrap();
-    let part = "-q study --synth-recordings 1 --config generator.duration_s=120 --shard 0/2 --out";
-    program::done(dir.path(), &[&words(part)[..], &["it's; mine"]].concat());
-    let (code, said) = said(dir.path(), &["merge", "it's; mine"]);
-    assert_eq!(code, 3, "{said}");
-    assert!(said.contains(r"--plan 'it'\''s; mine/plan.json' --shard 1/2 --out 'it'\''s; mine'"), "{said}");
 }
