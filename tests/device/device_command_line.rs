@@ -3,7 +3,6 @@
 use crate::common::device::software_device;
 use crate::common::program::{files, json, ran, said, same, without_host};
 
-/// `--device` with the index of the software device.
 fn device() -> Option<String> {
     software_device().map(|(_, index)| index.to_string())
 }

@@ -4,14 +4,13 @@
 
 use lanesweep::engine::Headway;
 use lanesweep::model::criterion::Criterion;
-use lanesweep::model::driver::{CutInBraking, ModelId};
+use lanesweep::model::driver::{BelowTrigger, CutInBraking, ModelId};
 use lanesweep::model::profile::Profile;
 use lanesweep::run::check::{Answer, Check, Demand, Holds, Judged, Judgement, Reading, RunEnd, Subject, Verdict};
 use lanesweep::scenario::{Category, PlainCase};
 use lanesweep::stats::random::philox4x32_10;
 
 const KMH: f64 = 1.0 / 3.6;
-/// 60 km/h.
 const V: f64 = 60.0 * KMH;
 /// Largest deceleration of the Annex's driver, m/s²; its ramp, m/s³; its deceleration during the delay, m/s².
 const FULL: f64 = 7.59294;
@@ -92,7 +91,6 @@ fn of(judgement: &Judgement, model: ModelId) -> &Judged {
     judgement.models.iter().find(|judged| judged.trace.model == model).unwrap()
 }
 
-/// The reading whose quantity begins so.
 fn reading<'j>(judgement: &'j Judgement, quantity: &str) -> &'j Reading {
     judgement.readings.iter().find(|reading| reading.quantity.starts_with(quantity)).unwrap()
 }
@@ -219,6 +217,7 @@ fn case_10_a_quick_cut_in_is_not_visible_for_0_72_s() {
     near(visible.value.unwrap(), 0.55, 1e-6);
     assert!(visible.holds() == Holds::No && reading(&judgement, "(c)").holds() == Holds::Yes);
     assert_eq!(judgement.demand(), Some(Demand::Nothing));
+    assert!(of(&judgement, ModelId::Reg157).reaction_s().unwrap() >= 0.72);
 }
 
 #[test]
@@ -293,12 +292,20 @@ fn lane_intrusion_follows_from_the_width_of_lane_and_cutter() {
     }
 }
 
-/// By hand: 60 behind 100 km/h that brakes at 6.8 m/s², 3 m ahead; the TTC is 2 s at 2.382 s, and CCHDM brakes 0.75 s later.
+/// By hand: 60 behind 100 km/h that brakes at 6.8 m/s², 3 m ahead; the TTC is 2 s at 2.382 s, and CCHDM brakes 0.75 s later. No
+/// driver of a regulation reacts before the speeds are equal.
 #[test]
 fn braking_on_a_gap_that_opened_begins_a_delay_after_the_reaction() {
     let cutter = PlainCase { acceleration_mps2: -6.8, lateral_speed_mps: 1.5, ..case(Category::CutIn, V, 100.0 * KMH) };
     let judgement = un_r157(&cutter, Headway::GapM(3.0));
     near(of(&judgement, ModelId::Cchdm).braking_s().unwrap(), 3.132, 0.011);
+    for name in ["un-r157", "eu-2022-1426", "eu-2022-1426-standing"] {
+        let judgement = under(Profile::load(name).unwrap(), &cutter, Headway::GapM(3.0));
+        for model in [ModelId::Reg157, ModelId::Cchdm] {
+            assert!(of(&judgement, model).reaction_s().unwrap() > 40.0 * KMH / 6.8, "{name}, {}", model.name());
+        }
+        assert!(of(&judgement, ModelId::Cchdm).collides());
+    }
 }
 
 /// 0.697 + 1.1 s at 4.1667 m/s are 7.489 m: a centimetre decides the demand there.
@@ -454,6 +461,11 @@ fn case_18_below_the_trigger_the_delay_begins_at_the_first_step_that_loses_speed
     for dt_s in [0.01, 0.1] {
         let judgement = under(shipped().with_dt(dt_s).unwrap(), &braking(3.0), Headway::ThwS(2.0));
         near(of(&judgement, ModelId::Cchdm).reaction_s().unwrap(), dt_s, 1e-9);
+    }
+    for (below, reacts_s) in [(BelowTrigger::Never, None), (BelowTrigger::AtOnce, Some(0.0))] {
+        let mut profile = shipped();
+        profile.cchdm.lvd_below_threshold = below;
+        assert_eq!(of(&under(profile, &braking(3.0), Headway::ThwS(2.0)), ModelId::Cchdm).reaction_s(), reacts_s);
     }
 }
 

@@ -12,7 +12,6 @@ use lanesweep::model::profile::Profile;
 use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::{Category, Scenario};
 
-/// Batches on every instruction set of this machine.
 fn in_batches() -> Vec<CpuBackend<f32>> {
     let sets = Instructions::available().into_iter().filter(|set| *set != Instructions::Scalar);
     sets.map(|set| CpuBackend::with_instructions(set).unwrap()).collect()

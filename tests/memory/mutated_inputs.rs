@@ -28,9 +28,7 @@ use mutate::mutated;
 use readers::Reader;
 use seeds::Seeds;
 
-/// Inputs of a quick run.
 const QUICK: u64 = 1600;
-/// Longest time of one input.
 const LONGEST: Duration = Duration::from_secs(5);
 /// An input that takes this long hangs: the process ends.
 const HANGS: Duration = Duration::from_secs(60);

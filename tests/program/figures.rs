@@ -8,7 +8,6 @@ use std::path::Path;
 
 use crate::common::program::ran;
 
-/// The figures of cut-ins whose tables are kept.
 const KEPT: [&str; 3] = ["f1", "radar", "headways"];
 
 #[test]

@@ -22,7 +22,6 @@ fn same(found: &Path, undisturbed: &Path) {
     program::same(&found, &expected, &undisturbed.display().to_string());
 }
 
-/// A folder with scenarios and a density.
 struct Bench {
     dir: tempfile::TempDir,
 }

@@ -2,7 +2,7 @@
 
 use crate::common::dice::cases;
 use crate::common::lane_sets::run_case;
-use crate::common::program::{self, files, json, ran, table};
+use crate::common::program::{json, ran, table};
 
 use lanesweep::engine::{CpuBackend, Executor, Headway, Start, Verdicts};
 use lanesweep::model::criterion::Criterion;
@@ -34,7 +34,6 @@ fn grid(category: Category, axes: &str, panels: &str, fixed: &str) -> Grid {
     Grid::new(GridParts { panel_axes, fixed: fixed.collect(), ..parts(category, x, y) }).unwrap()
 }
 
-/// Does a model collide, cell by cell?
 fn failed(map: &GridMap, model: usize) -> Vec<bool> {
     (0..map.cell_count()).map(|cell| map.verdicts(model, cell).failed(Criterion::Collision)).collect()
 }
@@ -52,7 +51,6 @@ fn swept(plan: &GridPlan) -> GridMap {
     GridMap::sweep(plan, &Executor::new(&backend)).unwrap().0
 }
 
-/// The map of a grid.
 fn mapped(grid: Grid, profile: &Profile, models: &[ModelId]) -> GridMap {
     swept(&GridPlan::new(grid, profile, models).unwrap())
 }
@@ -228,68 +226,6 @@ fn crash_shares_of_the_jrc_are_known_as_far_as_rounding_does_not_decide() {
         }
     }
     assert_eq!(compared, 11);
-}
-
-/// Where no vehicle comes into the ego's lane, and where no lane is over in time, there is no map.
-#[test]
-fn a_map_in_which_every_lane_ends_at_the_cap_is_an_error_that_says_what_to_check() {
-    let speeds = "ego_speed_mps=30 other_speed_mps=20";
-    let at_lateral_speed = |lateral: &str| grid(Category::CutIn, &format!("gap_m=10,20 {lateral}"), "", speeds);
-    let beside = || at_lateral_speed("lateral_speed_mps=0");
-    let sweep = |grid: Grid, profile: &Profile| {
-        let plan = GridPlan::new(grid, profile, &[ModelId::Fsm]).unwrap();
-        let backend = CpuBackend::lane_arithmetic();
-        GridMap::sweep(&plan, &Executor::new(&backend))
-    };
-    let error = sweep(beside(), &profile("jrc-2021")).unwrap_err();
-    let says = format!("{error} {}", error.help().unwrap());
-    for word in ["all 2 lanes", "34.9 s", "no vehicle comes into the ego's lane", "option `dt`", "lateral speeds"] {
-        assert!(says.contains(word), "{says}");
-    }
-    assert!(sweep(beside(), &profile("paper")).is_ok(), "settled: the ego has passed it");
-    let mut short = profile("paper");
-    short.frame.time_cap_s = 0.2;
-    assert!(sweep(at_lateral_speed("lateral_speed_mps=1"), &short).unwrap_err().to_string().contains("0.2 s"));
-    // CCHDM avoids every collision with a decelerating leader, in runs that all go on to the cap.
-    let jrc = profile("jrc-2021");
-    let lvd = Presets::Jrc.of(Category::Lvd, &jrc).unwrap().remove(0);
-    assert_eq!(mapped(lvd.grid, &jrc, &[ModelId::Cchdm]).failures(0, Criterion::Collision), 0);
-}
-
-#[test]
-fn the_same_files_come_from_any_number_of_threads() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    let axes = "--x gap_m=1..60/1 --y lateral_speed_mps=0.1..1.7/0.1";
-    let panels = "--panel ego_speed_kmh=60,90,120 --panel other_speed_kmh=20,70 --config map.closing=true";
-    let outs = ["1", "2", "5"].map(|threads| {
-        let flags = format!("--models FSM,CCHDM --backend cpu --threads {threads} --out {threads}");
-        let stdout = ran(dir, &format!("-q map cut-in {axes} {panels} {flags}"));
-        (stdout, program::without_host(files(&dir.join(threads))))
-    });
-    let names: Vec<String> = files(&dir.join("1")).into_keys().collect();
-    let expected = [
-        "cells.csv",
-        "figures/cut_in_cchdm.svg",
-        "figures/cut_in_fsm.svg",
-        "lanesweep-files.json",
-        "map.json",
-        "report.html",
-    ];
-    assert_eq!(names, expected);
-    for (stdout, files) in &outs {
-        assert_eq!(*stdout, outs[0].0);
-        program::same(files, &outs[0].1, "threads");
-    }
-    // Five panels of six: an ego of 60 km/h does not close in on 70 km/h. One row per cell and model.
-    let read = |name: &str| std::fs::read_to_string(dir.join("1").join(name)).unwrap();
-    assert_eq!(read("cells.csv").lines().count(), 1 + 5 * 60 * 17 * 2);
-    let record = json(&dir.join("1/map.json"));
-    assert_eq!(record["simulations"], 5 * 60 * 17 * 2);
-    assert_eq!(record["grids"][0]["plans"][0]["plan_sha256"].as_str().unwrap().len(), 64);
-    for words in ["Initial gap (m)", ">ego 120 km/h<", ">other 70 km/h<", "class=\"boundary\""] {
-        assert!(read("figures/cut_in_fsm.svg").contains(words), "{words}");
-    }
 }
 
 /// The page holds the cells of cells.csv in run lengths, for browsers that compute none.

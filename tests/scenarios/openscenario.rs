@@ -10,7 +10,6 @@ fn refused(dir: &Path, args: &[&str], status: i32, says: &str) {
     assert!(code == status && flat(&said).contains(says), "{args:?}: {code} {said}");
 }
 
-/// An element of a document with the names above it.
 struct Found {
     path: String,
     attributes: HashMap<String, String>,
@@ -70,7 +69,6 @@ fn unescaped(value: &str) -> String {
     text
 }
 
-/// What a player has of a vehicle.
 #[derive(Default)]
 struct Played {
     start: (f64, f64),
@@ -79,7 +77,6 @@ struct Played {
     width_m: f64,
     /// Time, place of the box's centre.
     path: Vec<(f64, f64, f64)>,
-    /// The same as it is written.
     written: Vec<(f64, f64)>,
 }
 
@@ -117,7 +114,6 @@ fn played(text: &str) -> (HashMap<String, Played>, Vec<Found>) {
     (vehicles, all)
 }
 
-/// Rows of `simulate` by column.
 fn series(text: &str) -> Vec<HashMap<String, String>> {
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     reader.deserialize().map(Result::unwrap).collect()

@@ -57,7 +57,6 @@ a,cut-in,FSM,108,20,1.2,,1.0,,,,,,
 c,cut-out,FSM,108,,1.2,,1.0,,,40,36,4,
 ";
 
-/// The numbers of a series but for its last row.
 fn before_end(series: &str) -> Vec<f64> {
     let steps: Vec<&str> = series.lines().skip(1).collect();
     let before_end = &steps[..steps.len() - 1];
@@ -126,7 +125,6 @@ fn numbers(values: &[f64]) -> ArrayRef {
     Arc::new(Float64Array::from(values.to_vec()))
 }
 
-/// The least that a table of series has.
 fn required_columns() -> Vec<(&'static str, ArrayRef)> {
     vec![
         ("id", texts(&["a", "b"])),

@@ -15,7 +15,6 @@ const REPEATS: u64 = 1000;
 /// As the claims and the answer of a study have it.
 const MIN_FAILING: usize = 10;
 
-/// Scenarios from which parameterizations are scored.
 #[derive(Clone)]
 struct Population {
     /// Share of scenarios in which S fails from some headway.
@@ -43,7 +42,6 @@ impl Uniform {
 }
 
 impl Population {
-    /// The counts of one scenario, a parameterization after the other.
     fn scenario(&self, random: &mut Uniform) -> Vec<Confusion<u32>> {
         let s = if random.next() < self.failing { 1 + (10.0 * random.next() * random.next()) as i32 } else { 0 };
         let (shared, is_shared) = ((random.next(), random.shift()), random.next() < self.common);

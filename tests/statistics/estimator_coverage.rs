@@ -172,7 +172,6 @@ fn confusion(random: &mut ChaCha8Rng, failing: f64, wrong: f64) -> Confusion<u32
     }
 }
 
-/// The interval that resampling the scenarios gives.
 fn percentiles(n: usize, seed: u64, of: impl Fn(&[usize]) -> Option<f64>) -> Option<(f64, f64)> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     random.set_stream(1);

@@ -72,7 +72,6 @@ struct Counted {
 }
 
 impl Counted {
-    /// Some of the default recordings.
     fn of_the_default() -> &'static Counted {
         static COUNTED: LazyLock<Counted> = LazyLock::new(|| Counted::of(recordings(28)));
         &COUNTED

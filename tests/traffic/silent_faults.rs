@@ -13,7 +13,6 @@ use crate::common::exid::Plain;
 use crate::common::small::Texts;
 use crate::traffic::tracks::{generated, says, understood};
 
-/// What is understood of a recording in highD's format.
 fn highd_understood(recording: &Recording) -> Understanding {
     let (dir, mut recording) = (tempfile::tempdir().unwrap(), recording.clone());
     highd::quantize(&mut recording).unwrap();
@@ -22,7 +21,6 @@ fn highd_understood(recording: &Recording) -> Understanding {
     InputFile::Highd(files).understand(Implausible::Accepted).unwrap().remove(0).understanding
 }
 
-/// A recording with a change.
 fn with(change: impl Fn(&mut Recording)) -> Recording {
     let mut recording = generated();
     change(&mut recording);
@@ -33,7 +31,6 @@ fn each_track(change: impl Fn(&mut Track)) -> Recording {
     with(|recording| recording.tracks.iter_mut().for_each(&change))
 }
 
-/// What good recordings must not be told.
 const WORDS: [&str; 14] = [
     "half extents",
     "none is longer",

@@ -16,7 +16,6 @@ use lanesweep::{Error, Result};
 enum Failure {
     /// In a task of the thread pool, as a defect in a lane would.
     Panic,
-    /// As a driver reports it.
     DeviceLost,
 }
 
