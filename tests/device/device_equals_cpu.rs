@@ -1,6 +1,4 @@
-//! Every output word of a device equals the CPU's, bit for bit, whatever the profile, the cut into jobs and the
-//! run-time checks; and a wrong shader is found. The software Vulkan stands for a device here; `lanesweep
-//! verify` asks the same of any other.
+//! Every output word of a device (here the software Vulkan) equals the CPU's, bit for bit; and a wrong shader is found.
 
 use crate::common::device::{open, patched, tampered};
 use crate::common::lane_sets::{forms, of_model, random, small_study, small_study_of, thresholds};

@@ -1,5 +1,4 @@
 //! Sizes at which kernels break: more than 65,535 workgroups in one dispatch, more than 2²⁷ lanes in one run.
-//! Every lane ends at its first step, and its verdict is known without computing it.
 
 use std::sync::Arc;
 

@@ -1,6 +1,4 @@
-//! What `src/random` makes of (seed, index), `shaders/shared/{philox,normal}.wgsl` make bit for bit: on
-//! the software Vulkan, for a million indices in eight dimensions, and for the words at which the table of normal
-//! deviates goes from one cubic to the next.
+//! What `src/random` makes of (seed, index), `shaders/shared/{philox,normal}.wgsl` make bit for bit on the software Vulkan.
 
 use crate::device::kernel::{Kernel, Path, WORKGROUP};
 use lanesweep::engine::gpu::shader::RANDOM;

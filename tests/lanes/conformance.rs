@@ -1,7 +1,4 @@
-//! Our lanes against the outputs of other people's simulators: the tables of `tests/golden`, row by row.
-//!
-//! The labels of all rows must be equal. On robust rows, whose outcome does not depend on rounding, types and values must
-//! be equal too.
+//! Our lanes against the outputs of other people's simulators, row by row: labels equal in all rows, values in robust ones.
 
 use std::collections::{BTreeSet, HashMap};
 use std::path::Path;

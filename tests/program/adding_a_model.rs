@@ -1,8 +1,5 @@
-//! Adding a driver model touches one Rust file, one WGSL file and one line of the registry: the example of
-//! `examples/adding-a-driver-model` is built in a copy of the sources and runs on the CPU and on a device.
-//!
-//! Of `.ci/long`, because it compiles our crates a second time (minutes):
-//! `cargo test --release --test commands adding_a_model:: -- --ignored`
+//! The example of `examples/adding-a-driver-model` is built in a copy of the sources and runs on the CPU and on a device
+//! (minutes): `cargo test --release --test commands adding_a_model:: -- --ignored`
 
 use std::fs;
 use std::path::{Path, PathBuf};

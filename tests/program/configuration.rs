@@ -1,5 +1,4 @@
-//! The configuration: every verb takes it, every record names it, and schema and keys are the same. Which source wins stands
-//! in `tests/messages/config.md`.
+//! The configuration: every verb takes it, every record names it, and schema and keys are the same.
 
 use std::collections::BTreeSet;
 

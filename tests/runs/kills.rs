@@ -1,8 +1,5 @@
-//! A run that is killed (SIGKILL, as a power cut or the system's memory killer would) at any moment leaves the files of
-//! one run beside a record, or no record; started again it ends as if undisturbed. Two processes on one folder: each ends
-//! as if alone or is refused. One run for each mechanism: publish of a folder (also over another run's), journal and
-//! resume, merge, files that are results by themselves. The long form is
-//! `LANESWEEP_KILLS=300 cargo test --release --test commands kills:: -- --nocapture`.
+//! A run that is killed at any moment leaves the files of one run beside a record, or no record; started again it ends as if
+//! undisturbed. Long: `LANESWEEP_KILLS=300 cargo test --release --test commands kills:: -- --nocapture`
 #![cfg(unix)]
 
 use crate::common::program::{self, Files, ended, kill, names, same, unbroken, without_times, words};

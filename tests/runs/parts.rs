@@ -1,6 +1,4 @@
-//! Runs in parts: whatever the number and order of shards, and wherever a run was interrupted, the result is that of
-//! the undisturbed run, byte for byte; a folder that cannot give it says what is missing. Journal, lock and the numbers of
-//! shards by themselves are in `mechanisms.rs`.
+//! Runs in parts: whatever the shards and interruptions, the result is that of the undisturbed run, byte for byte.
 
 use crate::common::program::{self, flat, kill, lanesweep, ran, start, unbroken, wait_for_run, without_host, words};
 

@@ -1,5 +1,4 @@
-//! Sampling runs: the same counts and the same failing lanes however a run is cut up, and what the command line makes
-//! of good and bad input.
+//! Sampling runs: the same counts and the same failing lanes however a run is cut up.
 
 use crate::common::mined::density_of;
 use crate::common::program::{json, ran, refused, table};

@@ -1,5 +1,4 @@
-//! Tables of scenarios and cases that users make: what is read of them. What is said of those that cannot be read stands in
-//! `tests/messages/tables.md`.
+//! Tables of scenarios and cases that users make: what is read of them (what is refused: `tests/messages/tables.md`).
 #![cfg(feature = "parquet")]
 
 use crate::common::program::{ran, said};

@@ -1,9 +1,5 @@
-//! How often the intervals of differences hold the truth, and how often verdicts about claims are wrong, over 1,000
-//! simulated studies of populations whose scores are known. Minutes long:
-//!
-//! ```text
-//! cargo test --release --test library claim_coverage:: -- --ignored --nocapture
-//! ```
+//! How often intervals of differences hold the truth and verdicts about claims are wrong, over 1,000 simulated studies
+//! (minutes): `cargo test --release --test library claim_coverage:: -- --ignored --nocapture`
 
 use lanesweep::engine::Confusion;
 use lanesweep::run::score::{ClaimVerdict, Contrast, ScenarioRate, ScoreInterval, f1, min_contrast};

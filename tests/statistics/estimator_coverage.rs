@@ -1,8 +1,5 @@
-//! How often the 95 % intervals hold the truth, over 1,000 seeded repeats of every estimator. Minutes long:
-//!
-//! ```text
-//! cargo test --release --test library estimator_coverage:: -- --ignored --nocapture
-//! ```
+//! How often the 95 % intervals hold the truth, over 1,000 seeded repeats of every estimator (minutes):
+//! `cargo test --release --test library estimator_coverage:: -- --ignored --nocapture`
 
 use lanesweep::engine::Confusion;
 use lanesweep::run::score::{ScoreOptions, f1, f1_interval};

@@ -1,5 +1,4 @@
-//! Tables and folders of others: every file is read or named, no preset takes a table that it would read in part, and what
-//! nothing tells is asked.
+//! Tables and folders of others: every file is read or named, and no preset takes a table that it would read in part.
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,5 +1,4 @@
-//! Tracks in other formats: the same traffic gives the same scenarios, and a file that contradicts itself is not used in
-//! silence.
+//! Tracks in other formats: the same traffic gives the same scenarios; files that contradict themselves are refused.
 
 use std::collections::BTreeMap;
 use std::path::Path;
