@@ -73,8 +73,8 @@ impl FormatFlag {
     /// Writes the files of a sampling run and prints its answer.
     pub(super) fn sample(self, sample: &Sample, result: &SampleResult, host: Host, results: Results) -> Result<Output> {
         let out = results.dir().to_path_buf();
-        let report = SampleReport::of_sample(sample, result, host)?;
-        let files = report.write(results, sample, result)?;
+        let report = SampleReport { sample, result, host };
+        let files = report.write(results)?;
         let output = self.output(Exit::Ok, || report.text(), || report.json(&files))?;
         tracing::info!("results written to {}", out.display());
         Ok(output.with_tables(|| files.tables))

@@ -55,7 +55,6 @@ pub fn recording() -> Recording {
     recording
 }
 
-/// The three files of a recording.
 #[derive(Debug, Clone)]
 pub struct Texts {
     pub tracks: String,
@@ -81,57 +80,33 @@ impl Texts {
         }
     }
 
-    /// Reads them as the recording `01`.
     pub fn read(&self) -> Result<Loaded> {
         self.read_checked(Implausible::Accepted)
     }
 
     pub fn read_checked(&self, implausible: Implausible) -> Result<Loaded> {
-        read_checked([&self.tracks, &self.tracks_meta, &self.recording_meta].map(|text| text.as_bytes()), implausible)
+        let dir = tempfile::tempdir().unwrap();
+        let files = HighdFiles::named(dir.path(), "01");
+        fs::write(&files.tracks, &self.tracks).unwrap();
+        fs::write(&files.tracks_meta, &self.tracks_meta).unwrap();
+        fs::write(&files.recording_meta, &self.recording_meta).unwrap();
+        InputFile::Highd(files).read(implausible).map(|mut all| all.remove(0))
     }
-}
-
-/// Reads three files of these contents (tracks, tracksMeta, recordingMeta) as the recording `01`.
-pub fn read_bytes(contents: [&[u8]; 3]) -> Result<Loaded> {
-    read_checked(contents, Implausible::Accepted)
-}
-
-fn read_checked(contents: [&[u8]; 3], implausible: Implausible) -> Result<Loaded> {
-    let dir = tempfile::tempdir().unwrap();
-    let files = HighdFiles::named(dir.path(), "01");
-    for (path, content) in [&files.tracks, &files.tracks_meta, &files.recording_meta].into_iter().zip(contents) {
-        fs::write(path, content).unwrap();
-    }
-    InputFile::Highd(files).read(implausible).map(|mut all| all.remove(0))
 }
 
 /// The table with one field replaced; lines are counted from 1 and include the header.
 pub fn with_field(table: &str, line: usize, column: &str, value: &str) -> String {
     let at = table.lines().next().unwrap().split(',').position(|name| name == column).expect("a column of the table");
-    edit_line(table, line, |text| {
+    let edit = |(number, text): (usize, &str)| {
         let mut fields: Vec<&str> = text.split(',').collect();
-        fields[at] = value;
-        fields.join(",")
-    })
+        if number + 1 == line {
+            fields[at] = value;
+        }
+        fields.join(",") + "\n"
+    };
+    table.lines().enumerate().map(edit).collect()
 }
 
-/// The table with one line changed.
-pub fn edit_line(table: &str, line: usize, edit: impl Fn(&str) -> String) -> String {
-    let edited = table.lines().enumerate().map(|(at, text)| if at + 1 == line { edit(text) } else { text.to_owned() });
-    edited.collect::<Vec<_>>().join("\n") + "\n"
-}
-
-/// The table with one of its lines again at the end.
-pub fn with_repeated_line(table: &str, line: usize) -> String {
-    format!("{table}{}\n", table.lines().nth(line - 1).unwrap())
-}
-
-/// The table without one line.
-pub fn without_line(table: &str, line: usize) -> String {
-    table.lines().enumerate().filter(|(at, _)| at + 1 != line).map(|(_, text)| format!("{text}\n")).collect()
-}
-
-/// The table without one column.
 pub fn without_column(table: &str, column: &str) -> String {
     let at = table.lines().next().unwrap().split(',').position(|name| name == column).expect("a column of the table");
     let short = |text: &str| {

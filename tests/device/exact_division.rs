@@ -40,7 +40,6 @@ fn lanes(@builtin(global_invocation_id) id: vec3<u32>) {
     }
 }
 ";
-/// Pairs of one dispatch.
 const BATCH: usize = 1 << 18;
 const MANTISSA: u32 = 0x007f_ffff;
 
@@ -60,7 +59,6 @@ impl Pairs {
         Pairs(ChaCha8Rng::seed_from_u64(157))
     }
 
-    /// A number in 0 … below − 1.
     fn below(&mut self, below: u32) -> u32 {
         ((u64::from(self.0.next_u32()) * u64::from(below)) >> 32) as u32
     }
@@ -80,7 +78,6 @@ impl Pairs {
         Question { a_bits, b_bits, guesses: guesses(a_bits, b_bits) }
     }
 
-    /// Two integers of 24 bits.
     fn mantissas(&mut self) -> (u32, u32) {
         let any = |pairs: &mut Pairs| 0x0080_0000 | (pairs.0.next_u32() & MANTISSA);
         match self.below(4) {
@@ -153,7 +150,6 @@ fn promised(a_bits: u32, b_bits: u32) -> u32 {
     if is_small { (a_bits ^ b_bits) & 0x8000_0000 } else { (a / b).to_bits() }
 }
 
-/// What a run has seen.
 #[derive(Debug, Default)]
 struct Seen {
     pairs: usize,

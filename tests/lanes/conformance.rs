@@ -1,7 +1,4 @@
-//! Our lanes against the outputs of other people's simulators: the tables of `tests/golden`, row by row.
-//!
-//! The labels of all rows must be equal. On robust rows, whose outcome does not depend on rounding, types and values must
-//! be equal too.
+//! Our lanes against the outputs of other people's simulators, row by row: labels equal in all rows, values in robust ones.
 
 use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
@@ -18,10 +15,8 @@ use lanesweep::scenario::{Case, Category, Tables, read_scenarios};
 use crate::common;
 use crate::common::lane_sets::run_lane;
 
-/// Maximum difference of values on robust rows.
 const TOLERANCE: f64 = 1e-6;
 
-/// One row, with its place for messages.
 struct Row {
     cells: HashMap<String, String>,
     place: String,
@@ -70,7 +65,6 @@ fn rows(path: &Path) -> Vec<Row> {
 /// The outcome of a lane, its steps, and the minima of TTC and gap.
 type Ran = (Outcome<f64>, Vec<Step<f64>>, [f64; 2]);
 
-/// One row of the JRC's case tables as a lane.
 struct Replay {
     model: ModelId,
     profile: Profile,

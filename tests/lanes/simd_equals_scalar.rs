@@ -1,5 +1,4 @@
-//! Lanes in batches give the same output words as lanes run one by one, bit for bit, on every instruction set of
-//! this machine, whatever the profile, the number of threads and the cut into calls.
+//! Lanes in batches give the bits of lanes one by one, on every instruction set of this machine, however they are cut.
 
 use crate::common::lane_sets::{forms, random, small_study, thresholds};
 use crate::common::mined::scenarios_of;

@@ -166,7 +166,6 @@ fn sides(
 /// Units of each threshold; each has four headways.
 const UNITS: u64 = 24;
 
-/// Units of a threshold in a block.
 fn units_of(plan: &LanePlan, block: usize, threshold: Threshold) -> impl Iterator<Item = u64> {
     (0..plan.blocks[block].units.len()).filter(move |&unit| Threshold::of_unit(unit) == threshold)
 }

@@ -17,8 +17,8 @@ use std::process::Command;
 use rayon::prelude::*;
 
 use crate::common::program::ran;
+use crate::program::command_line::verbs;
 use crate::program::console;
-use crate::program::shell::verbs;
 use markdown::{Document, Link};
 use shell::commands;
 

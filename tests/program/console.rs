@@ -5,6 +5,8 @@
 use std::path::Path;
 use std::process::Command;
 
+use rayon::prelude::*;
+
 use crate::common::program::PROGRAM;
 
 /// Runs the commands of a Markdown file, in order, in a folder; they must print what stands there.
@@ -73,20 +75,18 @@ fn line_fits(expected: &str, found: &str) -> bool {
     })
 }
 
-/// The messages for mistakes stand in `tests/messages/*.md`, the files that provoke them in the folders beside.
+/// Answers and messages stand in `tests/messages/*.md`, the files that provoke them in the folders beside.
 #[test]
-fn mistakes_are_answered_with_place_expectation_and_remedy() {
+fn every_answer_and_every_mistake_is_told_as_it_stands_in_the_messages() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/messages");
-    let mut checked = 0;
-    for entry in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
-        if entry.extension().is_some_and(|ending| ending == "md") {
-            let dir = tempfile::tempdir().unwrap();
-            crate::common::program::copy(&entry.with_extension("in"), dir.path());
-            check(&entry, dir.path());
-            checked += 1;
-        }
-    }
-    assert_eq!(checked, 5);
+    let files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let texts: Vec<_> = files.iter().filter(|path| path.extension().is_some_and(|ending| ending == "md")).collect();
+    assert_eq!(texts.len(), 9);
+    texts.par_iter().for_each(|text| {
+        let dir = tempfile::tempdir().unwrap();
+        crate::common::program::copy(&text.with_extension("in"), dir.path());
+        check(text, dir.path());
+    });
 }
 
 #[test]

@@ -7,9 +7,8 @@ use std::sync::OnceLock;
 
 use crate::common::program::PROGRAM;
 use crate::common::skipped;
-use crate::program::shell::verbs_of;
+use crate::program::command_line::verbs_of;
 
-/// A configuration with fewer recordings.
 fn fewer_recordings() -> &'static Path {
     static FILE: OnceLock<PathBuf> = OnceLock::new();
     FILE.get_or_init(|| {
@@ -69,7 +68,6 @@ fn smaller(line: &str) -> String {
     words.join(" ")
 }
 
-/// Two lanes of vehicles.
 fn tracks() -> String {
     let mut text = String::from("id;time;x;y;speed;length;width;lane\n");
     for vehicle in 0..8 {

@@ -3,8 +3,6 @@
 mod adding_a_model;
 mod book;
 mod check;
-mod check_sheet;
-mod check_tables;
 mod command_line;
 mod configuration;
 mod console;
@@ -12,5 +10,4 @@ mod figures;
 mod help_examples;
 mod report_page;
 mod report_width;
-mod shell;
 mod source_rules;

@@ -12,7 +12,6 @@ use lanesweep::engine::{CpuBackend, Executor, Wanted};
 use lanesweep::model::profile::Profile;
 use lanesweep::support::cancel::Cancel;
 
-/// The hidden, unfinished files of a folder.
 fn unfinished(dir: &Path) -> Vec<String> {
     names(dir).into_iter().filter(|name| name.ends_with(".part")).collect()
 }

@@ -1,11 +1,6 @@
-//! Runs in parts: whatever the number and order of shards, and wherever a run was interrupted, the result is that of
-//! the undisturbed run, byte for byte; a folder that cannot give it says what is missing. Journal, lock and the numbers of
-//! shards by themselves are in `mechanisms.rs`.
+//! Runs in parts: whatever the shards and interruptions, the result is that of the undisturbed run, byte for byte.
 
-use crate::common::program::{
-    self, flat, json, kill, lanesweep, limited, ran, refused, start, unbroken, wait_for_run, without_host, words,
-};
-use lanesweep::engine::ENGINE_VERSION;
+use crate::common::program::{self, flat, kill, lanesweep, ran, start, unbroken, wait_for_run, without_host, words};
 
 use std::path::Path;
 
@@ -15,8 +10,6 @@ pub fn same(a: &Path, b: &Path) {
 }
 
 const STUDY: &str = "-q study --synth-recordings 2 --published --backend cpu";
-const SAMPLE: &str = "-q sample densities/cut-in-2.json --samples 30000 --thw 0.6 --backend cpu";
-
 fn density(dir: &Path) {
     ran(dir, "-q fit --synth-recordings 3 --categories cut-in --parameterizations 2 --out densities");
 }
@@ -45,135 +38,6 @@ fn a_study_in_shards_is_the_study_in_one_piece() {
     let planned = "-q study --plan plan/plan.json --backend cpu --out";
     assert_eq!(ran(dir, &format!("{planned} planned")), whole);
     same(&dir.join("whole"), &dir.join("planned"));
-}
-
-#[test]
-fn a_folder_that_cannot_give_a_result_says_why_and_what_makes_it() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    density(dir);
-    std::fs::create_dir(dir.join("empty")).unwrap();
-    refused(dir, "merge empty", 3, "plan.json is missing");
-    refused(dir, "merge nowhere", 3, "no such folder");
-    std::fs::write(dir.join("empty/run.json"), "{}").unwrap();
-    refused(dir, "merge empty", 3, "an unsplit run");
-    ran(dir, &format!("{SAMPLE} --out p --shard 0/2"));
-    refused(dir, "merge p", 3, "15000 of 30000 units are missing");
-    let long = "name-of-a-folder/".repeat(6) + "run";
-    ran(dir, &format!("{SAMPLE} --out {long} --shard 0/2"));
-    // A command is one line, whatever its length.
-    let (.., said) = lanesweep(dir, &words(&format!("merge {long}")));
-    let command = format!("lanesweep sample --plan {long}/plan.json --shard 1/2 --out {long}");
-    assert!(said.lines().any(|line| line.trim() == command), "{said}");
-    ran(dir, &format!("{SAMPLE} --out p --shard 1/2"));
-    let part = dir.join("p/part-00001-of-00002.json");
-    let whole = std::fs::read(&part).unwrap();
-    // The same interval of another run, damaged in one byte, another part of this run.
-    ran(dir, &format!("{SAMPLE} --out q --seed 8 --shard 1/2"));
-    let read = |name: &str| std::fs::read(dir.join(name)).unwrap();
-    let mut damaged = whole.clone();
-    damaged[whole.len() / 2] ^= 1;
-    for (content, hint) in [
-        (read("q/part-00001-of-00002.json"), "foreign"),
-        (damaged, "--shard 1/2"),
-        (read("p/part-00000-of-00002.json"), "its name stands for"),
-    ] {
-        std::fs::write(&part, content).unwrap();
-        refused(dir, "merge p", 3, hint);
-    }
-    std::fs::write(&part, &whole).unwrap();
-    ran(dir, "-q merge p");
-    refused(dir, &format!("{SAMPLE} --out p --seed 8 --shard 1/2"), 3, "holds the plan of another run");
-    // Of a plan, nothing but what does not change the run.
-    refused(dir, "study --plan p/plan.json --seed 3", 2, "cannot be used with");
-    refused(dir, "study --plan p/plan.json --out x", 3, "a `study plan` is needed");
-}
-
-/// Replaces the first occurrence of a text in a file.
-fn edit(path: &Path, from: &str, to: &str) {
-    let bytes = std::fs::read(path).unwrap();
-    let at = bytes.windows(from.len()).position(|window| window == from.as_bytes()).expect(from);
-    std::fs::write(path, [&bytes[..at], to.as_bytes(), &bytes[at + from.len()..]].concat()).unwrap();
-}
-
-#[test]
-fn files_of_another_engine_are_neither_merged_nor_continued_nor_looked_at() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    density(dir);
-    let (own, other) = (ENGINE_VERSION, ENGINE_VERSION + 1);
-    let is_of_another = format!("of engine {other}, this program has engine {own}");
-    for (run, name, record) in [(STUDY, "study", "run.json"), (SAMPLE, "sample", "estimate.json")] {
-        let shard = |shard: &str| format!("{run} --out {name} --shard {shard}");
-        let _ = ["0/2", "1/2"].map(|of| ran(dir, &shard(of)));
-        let merge = format!("-q merge {name}");
-        let planned = format!("{} --plan {name}/plan.json --out x", words(run)[1]);
-        for (file, reader) in [("part-00001-of-00002.json", shard("1/2")), ("plan.json", planned)] {
-            let path = dir.join(name).join(file);
-            let whole = std::fs::read(&path).unwrap();
-            edit(&path, &format!("\"engine\":{own},"), &format!("\"engine\":{other},"));
-            let _ = [&merge, &reader].map(|line| refused(dir, line, 3, &is_of_another));
-            std::fs::write(&path, &whole).unwrap();
-        }
-        ran(dir, &merge);
-        // The records of whole runs say it too.
-        assert_eq!(json(&dir.join(name).join(record))["engine"], own);
-    }
-    let lane = "simulate --from sample --lane #0/2/0.6s/FSM";
-    ran(dir, lane);
-    edit(&dir.join("sample/estimate.json"), &format!("\"engine\": {own}"), &format!("\"engine\": {other}"));
-    refused(dir, lane, 3, &is_of_another);
-}
-
-#[test]
-fn a_damaged_plan_is_whole_again_after_the_command_that_its_message_names() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    let again = format!("{STUDY} --plan-only --out study");
-    ran(dir, &again);
-    let path = dir.join("study/plan.json");
-    let whole = std::fs::read(&path).unwrap();
-    let mut changed = whole.clone();
-    *changed.last_mut().unwrap() ^= 1;
-    for bytes in [[&whole[..], b"x"].concat(), changed, whole[..whole.len() - 1].to_vec()] {
-        std::fs::write(&path, &bytes).unwrap();
-        refused(dir, "study --plan study/plan.json --out x", 3, "study/plan.json");
-        ran(dir, &again);
-        assert!(std::fs::read(&path).unwrap() == whole);
-    }
-    // What stands before the records names the run: another one's plan is never written over.
-    std::fs::write(&path, &whole[..1000]).unwrap();
-    refused(dir, &again, 3, "this folder holds the plan of another run");
-    // A shard that was given a plan leaves a whole one, too.
-    ran(dir, &format!("{STUDY} --plan-only --out given"));
-    std::fs::write(&path, &whole[..whole.len() - 1]).unwrap();
-    ran(dir, "-q study --plan given/plan.json --shard 0/9 --out study --backend cpu");
-    assert!(std::fs::read(&path).unwrap() == whole);
-}
-
-/// 8,000 scenarios had 22 kB each in a plan: 600 MB to write it, 450 MB to read it.
-#[cfg(unix)]
-#[test]
-fn a_plan_of_many_scenarios_takes_little_memory() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    let golden = std::fs::read_to_string(crate::common::golden("paper_sumo_01_02_scenarios.jsonl")).unwrap();
-    let rows: Vec<serde_json::Value> = golden.lines().map(|line| line.parse().unwrap()).collect();
-    let line = |(number, row): (i32, &serde_json::Value)| {
-        let mut row = row.clone();
-        row["id"] = format!("{}~{number}", row["id"].as_str().unwrap()).into();
-        format!("{row}\n")
-    };
-    let many = (0..8000).zip(rows.iter().filter(|row| row["kept"] == true).cycle()).map(line);
-    std::fs::write(dir.join("many.jsonl"), many.collect::<String>()).unwrap();
-    // Addresses, not memory that is in use: the limit that a shell can set.
-    for args in ["--scenarios many.jsonl --plan-only", "--plan p/plan.json --shard 7/400"] {
-        let study = format!("-q --threads 1 study --backend cpu --out p {args}");
-        let (code, _, err) = limited(dir, "ulimit -v 400000", &words(&study));
-        assert_eq!(code, 0, "{args}: {err}");
-    }
-    let bytes = std::fs::metadata(dir.join("p/plan.json")).unwrap().len();
-    assert!(bytes < 8000 * 3000, "{bytes} bytes");
 }
 
 #[test]

@@ -1,5 +1,4 @@
-//! Sampling runs: the same counts and the same failing lanes however a run is cut up, and what the command line makes
-//! of good and bad input.
+//! Sampling runs: the same counts and the same failing lanes however a run is cut up.
 
 use crate::common::mined::density_of;
 use crate::common::program::{json, ran, refused, table};
@@ -8,69 +7,23 @@ use crate::common::{self, program};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use lanesweep::engine::{Backend, CpuBackend, Executor, Headway, LanePlan, SampleTally, Wanted};
+use lanesweep::engine::{CpuBackend, Executor, Headway};
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::{MODELS, ModelId};
 use lanesweep::model::profile::Profile;
-use lanesweep::run::sampling::{Estimator, Sample, SampleHeadways, SampleOptions, plan_samples};
+use lanesweep::run::sampling::{Estimator, Sample, SampleHeadways, SampleOptions};
 use lanesweep::scenario::{Category, Driven};
-use lanesweep::stats::density::{Bandwidth, DensityModel, Exposure, Kde, read_density, write_density};
+use lanesweep::stats::density::{Bandwidth, DensityModel, Exposure, Kde, write_density};
 use lanesweep::stats::estimate::Search;
 
 fn density(category: Category, key: &str) -> DensityModel {
     density_of(24, category, key, false)
 }
 
-/// A folder with a density file in it.
 fn folder() -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     write_density(&dir.path().join("density.json"), &density(Category::CutIn, "2")).unwrap();
     dir
-}
-
-fn options_of(samples: u64) -> SampleOptions {
-    let headways = SampleHeadways::Each(vec![Headway::ThwS(1.0), Headway::ThwS(0.4)]);
-    SampleOptions { seed: 5, ..SampleOptions::new(Estimator::Crude, samples, headways) }
-}
-
-fn plan(density: &DensityModel, samples: u64, profile: &Profile) -> LanePlan {
-    plan_samples(density, profile, &options_of(samples)).unwrap()
-}
-
-/// Counts in chunks that end at these samples, joined in the order given.
-fn tally(plan: &LanePlan, backend: &dyn Backend, ranges: &[(u64, u64)]) -> SampleTally {
-    let mut session = backend.prepare(plan).unwrap();
-    ranges.iter().fold(SampleTally::empty(plan), |all, &(from, to)| {
-        let chunk = session.run(from..to, Wanted::Counts).unwrap();
-        all.merge(SampleTally::of_chunk(plan, &chunk).unwrap()).unwrap()
-    })
-}
-
-#[test]
-fn counts_are_the_same_however_a_run_is_cut_up() {
-    let (n, profile, cpu) = (3700, Profile::load("paper").unwrap(), CpuBackend::lane_arithmetic());
-    let plan = plan(&density(Category::CutIn, "2"), n, &profile);
-    let whole = tally(&plan, &cpu, &[(0, n)]);
-    assert!(whole.failures.iter().sum::<u64>() > 0);
-    let of_37: Vec<(u64, u64)> = (0..37).map(|k| (100 * k, 100 * (k + 1))).collect();
-    let backwards: Vec<(u64, u64)> = of_37.iter().rev().copied().collect();
-    for ranges in [&of_37, &backwards, &vec![(1234, n), (0, 1), (1, 1234)]] {
-        assert!(whole == tally(&plan, &cpu, ranges), "{} chunks", ranges.len());
-    }
-    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    assert!(whole == one.install(|| tally(&plan, &cpu, &of_37)), "one thread");
-}
-
-#[test]
-fn parts_of_different_runs_and_doubled_parts_do_not_join() {
-    let profile = Profile::load("paper").unwrap();
-    let density = density(Category::CutIn, "2");
-    let (one, other) = (plan(&density, 500, &profile), plan(&density, 501, &profile));
-    let cpu = CpuBackend::lane_arithmetic();
-    let part = |plan: &LanePlan, from, to| tally(plan, &cpu, &[(from, to)]);
-    assert!(part(&one, 0, 100).merge(part(&other, 100, 200)).is_err(), "two runs");
-    let error = part(&one, 0, 100).merge(part(&one, 99, 200)).unwrap_err().to_string();
-    assert!(error.contains("samples 99 to 99 are in both"), "{error}");
 }
 
 /// The first `limit` failing rows of each model and criterion, as lines of the table.
@@ -227,24 +180,6 @@ fn a_searched_proposal_can_be_sampled_again_and_in_shards_with_its_failing_draws
     }
 }
 
-/// The half-width decides how a question is answered, and every question is answered.
-#[test]
-fn auto_answers_frequent_failures_by_crude_lanes_and_rare_ones_by_importance_sampling() {
-    let dir = folder();
-    let line = "-q sample density.json --thw 0.3,2.1 --models FSM --backend cpu --half-width 0.2";
-    let text = ran(dir.path(), line);
-    assert!(text.contains("Rare failures, by importance sampling"), "{text}");
-    let table = estimates(dir.path(), "lanesweep-sample");
-    let mut estimators = Vec::new();
-    for line in table.lines().filter(|line| line.contains("FSM,collision") && !line.contains(",all,")) {
-        let cell: Vec<&str> = line.split(',').collect();
-        let [p, low, high] = [8, 13, 14].map(|at| cell[at].parse::<f64>().unwrap());
-        assert!(p > 0.0 && (high - low) / (2.0 * p) < 0.25, "{line}");
-        estimators.push(cell[2]);
-    }
-    assert_eq!(estimators, ["mc", "is"]);
-}
-
 #[test]
 fn p_at_both_ends_of_the_bandwidths_interval_is_that_of_the_density_there_by_either_estimator() {
     let (profile, cpu) = (Profile::load("paper").unwrap(), CpuBackend::lane_arithmetic());
@@ -287,21 +222,6 @@ fn p_at_both_ends_of_the_bandwidths_interval_is_that_of_the_density_there_by_eit
     }
 }
 
-#[test]
-fn a_search_alone_finds_the_same_probability_with_few_lanes_and_never_calls_it_sound() {
-    let dir = folder();
-    let base = "-q sample density.json --thw 2 --models FSM --backend cpu --estimator is --half-width 0.2";
-    let text = ran(dir.path(), &format!("{base} --assurance search --out search"));
-    assert!(text.contains("not bounded"), "{text}");
-    ran(dir.path(), &format!("{base} --out draws"));
-    let [alone, bounded] = ["search", "draws"].map(|of| table(&dir.path().join(of).join("estimates.csv")).remove(0));
-    let number = |row: &BTreeMap<String, String>, column: &str| row[column].parse::<f64>().unwrap();
-    assert!(["searched", "doubtful"].contains(&&*alone["draws"]) && bounded["draws"] == "sound", "{alone:?}");
-    assert!(number(&alone, "runs") < 60_000.0 && number(&alone, "crude_fraction") == 0.0, "{alone:?}");
-    assert!(number(&alone, "draws_low") < number(&bounded, "draws_high"), "{alone:?} {bounded:?}");
-    assert!(number(&alone, "draws_high") > number(&bounded, "draws_low"), "{alone:?} {bounded:?}");
-}
-
 /// The density over the first scenarios only, scale and bandwidth held.
 fn of_few(density: &DensityModel, scenarios: usize) -> DensityModel {
     let kde = &density.kde;
@@ -327,7 +247,6 @@ fn estimated(dir: &Path, density: &str, more: &str) -> (serde_json::Value, Strin
     (json(&dir.join("lanesweep-sample/estimate.json")), text)
 }
 
-/// Ends of a row's interval.
 fn interval(row: &serde_json::Value) -> [f64; 2] {
     ["low", "high"].map(|end| row["estimate"]["interval"][end].as_f64().unwrap())
 }
@@ -373,32 +292,4 @@ fn draws_of_a_proposal_tell_their_scenarios_by_the_kernels_that_explain_them() {
     assert!(carriers(&crude).contains(&carriers(&rows[0])[0]), "{crude} {}", rows[0]);
     let few = estimated(dir.path(), "nine.json", how).0["estimates"][0].clone();
     assert!(few["estimate"]["trust"]["warnings"].to_string().contains("few_scenarios"), "{few}");
-}
-
-#[test]
-fn bad_input_is_told_with_its_place_and_what_to_do() {
-    let dir = folder();
-    let dir = dir.path();
-    write_density(&dir.join("cut-out.json"), &density(Category::CutOut, "a")).unwrap();
-    let text = std::fs::read_to_string(dir.join("density.json")).unwrap();
-    let newer = text.replace("\"lanesweep_density\": 2", "\"lanesweep_density\": 3");
-    std::fs::write(dir.join("newer.json"), newer).unwrap();
-    std::fs::write(dir.join("cut.json"), &text[..text.len() / 2]).unwrap();
-    for (args, code, said) in [
-        ("@ --estimator is --samples 300000000000000", 2, "a whole number from 1 to 281474976710655"),
-        ("@ --estimator is --time-limit 3", 2, "belongs to crude Monte Carlo"),
-        ("@ --samples 0", 2, "--samples: `0` cannot be used"),
-        ("@ --thw -1", 2, "not a time headway"),
-        ("@ --thw sampled", 2, "--with-thw"),
-        ("@ --shard 5/5", 2, "no shard 5 of 5"),
-        ("@ --shard 0/2 --half-width 0.1", 2, "cannot evaluate a stop rule"),
-        ("@ --level 0.05", 2, "at least 0.5 and below 1"),
-        ("newer.json", 3, "version 2"),
-        ("cut.json", 3, "cut.json"),
-        ("@ --estimator is --thw 1 --proposal @", 3, "no proposal"),
-        ("cut-out.json --profile jrc-2021", 2, "exposure"),
-    ] {
-        refused(dir, &format!("sample {}", args.replace('@', "density.json")), code, said);
-    }
-    assert!(read_density(&dir.join("density.json")).is_ok());
 }

@@ -10,7 +10,6 @@ fn refused(dir: &Path, args: &[&str], status: i32, says: &str) {
     assert!(code == status && flat(&said).contains(says), "{args:?}: {code} {said}");
 }
 
-/// An element of a document with the names above it.
 struct Found {
     path: String,
     attributes: HashMap<String, String>,
@@ -70,7 +69,6 @@ fn unescaped(value: &str) -> String {
     text
 }
 
-/// What a player has of a vehicle.
 #[derive(Default)]
 struct Played {
     start: (f64, f64),
@@ -79,7 +77,6 @@ struct Played {
     width_m: f64,
     /// Time, place of the box's centre.
     path: Vec<(f64, f64, f64)>,
-    /// The same as it is written.
     written: Vec<(f64, f64)>,
 }
 
@@ -117,7 +114,6 @@ fn played(text: &str) -> (HashMap<String, Played>, Vec<Found>) {
     (vehicles, all)
 }
 
-/// Rows of `simulate` by column.
 fn series(text: &str) -> Vec<HashMap<String, String>> {
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     reader.deserialize().map(Result::unwrap).collect()
@@ -374,25 +370,5 @@ fn odd_names_are_escaped_and_read_back_and_make_plain_file_names() {
         }
         let index = series(&std::fs::read_to_string(dir.path().join("x/index.csv")).unwrap());
         assert_eq!(index[0]["lane"], lane);
-    }
-}
-
-#[test]
-fn what_cannot_be_exported_is_named() {
-    let dir = tempfile::tempdir().unwrap();
-    let root = dir.path();
-    let xosc = |more: &[&'static str]| [&["simulate", "--xosc", "x"], more].concat();
-    refused(root, &xosc(&["--lane", "a/S/1.2s/FSM"]), 2, "a key alone does not identify a lane");
-    refused(root, &xosc(&["--from", "nowhere", "--lane", "a/S/1.2s/FSM"]), 3, "there is no run here");
-    refused(root, &xosc(&["--category", "cut-in", "--models", "FSM"]), 2, "ego_speed: it is missing");
-    refused(root, &[&xosc(&["--lane-width", "0"])[..], &cut_in()].concat(), 2, "not a lane width");
-    refused(root, &[&["simulate", "--xosc", "file/x"][..], &cut_in()].concat(), 0, "");
-    std::fs::write(root.join("taken"), "").unwrap();
-    refused(root, &[&["simulate", "--xosc", "taken"][..], &cut_in()].concat(), 6, "cannot create the folder");
-    // The JRC's frozen vehicle: its place before the crash is not in the lane.
-    let crash = "--category cut-out --models FSM --ego-speed 30m/s --gap 40 --lateral-speed 0.3 --ahead-gap 5 --profile jrc-2021";
-    refused(root, &xosc(&words(crash)), 3, "hits the one ahead");
-    for flag in ["--ego=external", "--side=left", "--duration=5"] {
-        refused(root, &[&["simulate", flag][..], &cut_in()].concat(), 2, "--xosc <DIR>");
     }
 }

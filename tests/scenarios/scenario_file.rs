@@ -1,14 +1,9 @@
-//! The scenario file: what is written is read to the last bit, and what cannot be a scenario is refused
-//! with the line, the scenario and the field.
-
-use std::path::Path;
+//! The scenario file: what is written is read to the last bit.
 
 use lanesweep::model::plausibility::Implausible;
 use lanesweep::scenario::{
     Category, Ego, Other, Scenario, Side, read_scenario_file, read_scenarios, write_scenarios, write_scenarios_to,
 };
-use lanesweep::support::error::Error;
-use serde_json::Value;
 
 use crate::common;
 
@@ -44,32 +39,6 @@ fn cut_out() -> Scenario {
         replays: Vec::new(),
         fold: None,
     }
-}
-
-fn file(text: impl AsRef<[u8]>) -> tempfile::NamedTempFile {
-    let file = tempfile::NamedTempFile::new().unwrap();
-    std::fs::write(file.path(), text).unwrap();
-    file
-}
-
-fn line(change: impl FnOnce(&mut Value)) -> String {
-    let mut value = serde_json::to_value(cut_out()).unwrap();
-    change(&mut value);
-    value.to_string()
-}
-
-/// The message of the refusal, which must offer help.
-fn refused(text: impl AsRef<[u8]>) -> String {
-    let error = read_scenarios(file(text).path()).unwrap_err();
-    assert!(error.help().is_some_and(|h| !h.is_empty()), "{error}");
-    error.to_string()
-}
-
-fn refused_change(change: impl FnOnce(&mut Value)) -> String {
-    let message = refused(line(change));
-    assert!(message.contains("line 1"), "{message}");
-    assert!(message.contains("scenario 01_cut_out_5_4_77"), "{message}");
-    message
 }
 
 #[test]
@@ -136,66 +105,6 @@ fn a_scenario_survives_the_file_to_the_last_bit() {
     write_scenarios_to(&mut bytes, &read).unwrap();
     assert_eq!(bytes, std::fs::read(&path).unwrap());
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary file stays");
-}
-
-#[test]
-fn a_byte_order_mark_windows_line_ends_and_empty_lines_are_accepted() {
-    let second = line(|v| v["id"] = "b".into());
-    let text = format!("\u{feff}{}\r\n\r\n{second}\r\n", line(|_| ()));
-    let read = read_scenarios(file(text).path()).unwrap();
-    assert_eq!(read.iter().map(|s| s.id.as_str()).collect::<Vec<_>>(), ["01_cut_out_5_4_77", "b"]);
-    assert_eq!(read[0], cut_out());
-}
-
-#[test]
-fn what_cannot_be_a_scenario_is_refused_by_field() {
-    for field in ["category", "fps", "ego", "side", "target"] {
-        let message = refused_change(|v| drop(v.as_object_mut().unwrap().remove(field)));
-        assert!(message.contains(&format!("`{field}`")) && message.contains("missing"), "{message}");
-    }
-    type Change = fn(&mut Value);
-    let cases: [([&str; 2], Change); 17] = [
-        (["`target.v`", "missing"], |v| drop(v["target"].as_object_mut().unwrap().remove("v"))),
-        (["`category`", "\"cut_in\""], |v| v["category"] = "overtake".into()),
-        (["`lead.y[2]`", ""], |v| v["lead"]["y"][2] = Value::Null),
-        (["`ego_id`", ""], |v| v["ego_id"] = (-3).into()),
-        (["`fps`", "expected"], |v| v["fps"] = 0.0.into()),
-        (["`fps`", "expected"], |v| v["fps"] = (-25.0).into()),
-        (["`ego.v0`", "expected"], |v| v["ego"]["v0"] = (-1.0).into()),
-        (["`ego.length`", "expected"], |v| v["ego"]["length"] = 0.0.into()),
-        (["`target.width`", "expected"], |v| v["target"]["width"] = (-2.0).into()),
-        (["`target.v[1]`", "expected"], |v| v["target"]["v"][1] = (-0.5).into()),
-        (["`lead.length`", "expected"], |v| v["lead"]["length"] = (-4.0).into()),
-        (["`lane_width`", "expected"], |v| v["lane_width"] = 0.0.into()),
-        (["`target.y`", "1 samples"], |v| v["target"]["y"] = vec![1.0].into()),
-        (["`lead.v`", ""], |v| v["lead"]["v"] = vec![1.0; 5].into()),
-        (["at least 2", ""], |v| ["v", "y"].iter().for_each(|of| v["target"][*of] = vec![20.0].into())),
-        (["at least 2", ""], |v| ["v", "y"].iter().for_each(|of| v["target"][*of] = Vec::<f64>::new().into())),
-        // A kept cut-out needs the vehicle ahead.
-        (["`lead`", ""], |v| v["lead"] = Value::Null),
-    ];
-    for (says, change) in cases {
-        let message = refused_change(change);
-        assert!(says.iter().all(|said| message.contains(said)), "{says:?}: {message}");
-    }
-    assert!(refused_change(|v| v["D"] = Value::Null).contains("`D`"));
-    assert!(refused(line(|v| drop(v.as_object_mut().unwrap().remove("id")))).contains("`id`"));
-    let text = line(|v| {
-        v["lead"] = Value::Null;
-        v["D"] = Value::Null;
-        v["kept"] = false.into();
-    });
-    assert!(read_scenarios(file(text).path()).unwrap()[0].lead.is_none());
-}
-
-#[test]
-fn a_file_without_scenarios_and_a_missing_file_are_refused() {
-    for empty in ["", "\n\n", "\u{feff}\r\n"] {
-        assert!(refused(empty).contains("holds no scenario"));
-    }
-    let missing = Path::new("no/such/file.jsonl");
-    assert!(matches!(read_scenarios(missing), Err(Error::Io { .. })));
-    assert!(matches!(write_scenarios(missing, &[cut_out()]), Err(Error::Io { .. })));
 }
 
 #[test]

@@ -1,7 +1,5 @@
-//! Adaptive importance sampling against crude Monte Carlo with 10⁸ lanes, on mined scenarios.
-//!
-//! The long test: `cargo test --release --test library estimators_on_lanes:: -- --ignored --nocapture` (about six minutes on
-//! two cores; LANESWEEP_DLR_HT names a folder of DLR-HT recordings in highD's format).
+//! Adaptive importance sampling against crude Monte Carlo on mined scenarios. With 10⁸ lanes (minutes):
+//! `cargo test --release --test library estimators_on_lanes:: -- --ignored --nocapture`
 
 use crate::common;
 use crate::common::mined::{provenance, scenarios};

@@ -1,12 +1,12 @@
-//! Recordings whose numbers are plausible one by one, but not beside one another: a mirrored axis, another reference point.
+//! Recordings whose numbers are plausible one by one, but not beside one another.
 
 use crate::common::exid::Plain;
 use crate::common::small::{self, Texts, cruising};
 
 use lanesweep::Error;
 use lanesweep::model::plausibility::Implausible;
-use lanesweep::traffic::trajectory::Recording;
 use lanesweep::traffic::trajectory::highd;
+use lanesweep::traffic::trajectory::{Recording, Track};
 
 /// Ten vehicles in five lanes of both directions, 2.4 s; each sways across its lane.
 fn traffic() -> Recording {
@@ -88,4 +88,30 @@ fn a_single_vehicle_outside_its_lane_and_boxes_that_overlap_are_warnings() {
     let has = |words: &[&str]| notes.iter().any(|note| words.iter().all(|word| note.contains(word)));
     assert!(has(&["10 % of the samples", "vehicle 2 at frame 1", "laneId"]), "{notes:?}");
     assert!(has(&["1 pair(s) of vehicles overlap", "vehicles 1 and 6 at frame 25"]), "{notes:?}");
+}
+
+/// Readers of tracks do the same: `foreign_tables.rs`.
+#[test]
+fn a_speed_that_contradicts_the_positions_and_a_jump_are_refused_unless_accepted() {
+    let mut recording = small::recording();
+    recording.tracks = vec![small::cruising(1, 1, 0, 1, 300, &recording)];
+    recording.tracks[0].v_s_mps[0] += 0.1;
+    highd::quantize(&mut recording).unwrap();
+    let spoilt: [fn(&mut Track); 2] =
+        [|track| track.v_s_mps[30] = 0.0, |track| track.s_m[30..].iter_mut().for_each(|s| *s += 8.0)];
+    for spoil in spoilt {
+        let mut wrong = recording.clone();
+        spoil(&mut wrong.tracks[0]);
+        let texts = Texts::of(&wrong);
+        let error = texts.read_checked(Implausible::Refused).unwrap_err();
+        let said = error.to_string();
+        let parts = ["01_tracks.csv", "vehicle 1 at frame", "its speed is", "but it moves by"];
+        assert!(parts.iter().all(|part| said.contains(part)) && error.help().is_some(), "{said}");
+        let accepted = texts.read().unwrap();
+        assert!(accepted.notes.iter().any(|note| note.contains("its speed is")), "{:?}", accepted.notes);
+    }
+    // A small jump is said.
+    recording.tracks[0].s_m[30..].iter_mut().for_each(|s| *s += 3.0);
+    let loaded = Texts::of(&recording).read().unwrap();
+    assert!(loaded.notes.iter().any(|note| note.contains("jump by more than 2 m")), "{:?}", loaded.notes);
 }

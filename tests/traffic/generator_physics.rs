@@ -1,6 +1,7 @@
 //! The synthetic recordings are physically possible, well-formed, and the same everywhere.
 
 use crate::common::mined::recordings;
+use lanesweep::support::plain_text::hex;
 use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate, generate_one};
 use lanesweep::traffic::trajectory::{Recording, Track};
 use rayon::prelude::*;
@@ -10,36 +11,28 @@ use sha2::{Digest, Sha256};
 /// and then on purpose: every published default result changes with it.
 const DEFAULT_DIGEST: &str = "e070e1fefac703b2c818b9e4919b5b2b06d73352db96732935e6f188b82739f8";
 
-/// Every field of every recording, numbers as their bits.
 fn digest(recordings: &[Recording]) -> String {
     let mut hash = Sha256::new();
     for recording in recordings {
         hash.update(recording.id.as_bytes());
-        hash.update(recording.frame_rate_hz.to_bits().to_le_bytes());
+        hash.update(bytemuck::bytes_of(&recording.frame_rate_hz));
         for carriageway in &recording.carriageways {
             hash.update(carriageway.name.as_bytes());
-            for line in &carriageway.lane_lines_m {
-                hash.update(line.to_bits().to_le_bytes());
-            }
+            hash.update(bytemuck::cast_slice(&carriageway.lane_lines_m));
         }
         for track in &recording.tracks {
             hash.update(track.id.to_le_bytes());
             hash.update(format!("{:?}", track.class).as_bytes());
             hash.update((track.carriageway as u64).to_le_bytes());
             hash.update(track.first_frame.to_le_bytes());
-            hash.update(track.length_m.to_bits().to_le_bytes());
-            hash.update(track.width_m.to_bits().to_le_bytes());
+            hash.update(bytemuck::cast_slice(&[track.length_m, track.width_m]));
             for series in [&track.s_m, &track.d_m, &track.v_s_mps, &track.v_d_mps, &track.a_s_mps2] {
-                for value in series {
-                    hash.update(value.to_bits().to_le_bytes());
-                }
+                hash.update(bytemuck::cast_slice(series));
             }
-            for lane in &track.lane {
-                hash.update(lane.to_le_bytes());
-            }
+            hash.update(bytemuck::cast_slice(&track.lane));
         }
     }
-    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+    hex(&hash.finalize())
 }
 
 #[test]

@@ -1,7 +1,6 @@
 //! Recordings and mining: what is read, what is refused, which scenarios are found.
 
 mod bad_geometry;
-mod bad_recordings;
 mod field_reports;
 mod foreign_encodings;
 mod foreign_tables;

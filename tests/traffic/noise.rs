@@ -27,7 +27,6 @@ fn made() -> Recording {
     recording
 }
 
-/// Its table on a bend of this radius, without speeds.
 fn without_speeds(radius_m: f64) -> Plain {
     Plain::on_bend(&recording(), 1, radius_m).without(&["heading", "speed", "vx", "vy"])
 }

@@ -13,7 +13,6 @@ use crate::common::exid::Plain;
 use crate::common::small::Texts;
 use crate::traffic::tracks::{generated, says, understood};
 
-/// What is understood of a recording in highD's format.
 fn highd_understood(recording: &Recording) -> Understanding {
     let (dir, mut recording) = (tempfile::tempdir().unwrap(), recording.clone());
     highd::quantize(&mut recording).unwrap();
@@ -22,7 +21,6 @@ fn highd_understood(recording: &Recording) -> Understanding {
     InputFile::Highd(files).understand(Implausible::Accepted).unwrap().remove(0).understanding
 }
 
-/// A recording with a change.
 fn with(change: impl Fn(&mut Recording)) -> Recording {
     let mut recording = generated();
     change(&mut recording);

@@ -35,11 +35,9 @@ fn place((_, _, lane, front_m, speed, change): Driven, time_s: f64, change_s: f6
     (front_m + speed * time_s, y_m, (y_m / LANE_WIDTH_M) as usize)
 }
 
-/// Where a vehicle is at a time.
 struct Sample {
     frame: usize,
     time: f64,
-    /// Index of the vehicle.
     at: usize,
     vehicle: Driven,
     x: f64,
@@ -47,7 +45,6 @@ struct Sample {
     lane: usize,
 }
 
-/// The vehicles at every time, in the order of time.
 fn samples(vehicles: &[Driven], seconds: usize, change_s: f64) -> Vec<Sample> {
     let of_time = |(frame, time): (usize, f64)| {
         vehicles.iter().enumerate().map(move |(at, &vehicle)| {
