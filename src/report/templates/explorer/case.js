@@ -51,9 +51,9 @@ function decisive({ steps, outcome: { bits, reaction, end } }, { ttc, btn }) {
   return Math.max(reaction ?? 0, bits & 1 ? end : 0, changed, first(({ gap }) => gap, Infinity, (least) => Math.max(0.01, least / 20)),
     first((step) => step.ttc, 10 * ttc, (least) => least / 20), first((step) => -step.btn, -btn / 10, (least) => -least / 20));
 }
-// Of the panels over time, the values of a driver, of the other vehicles, which are the same for all, and those that scale it.
+// Of the panels over time, the values of a driver, and of the other vehicles, which are the same for all.
 const PANELS = [
-  { title: "Gap from the ego (m)", of: ({ vehicles }) => vehicles.map(({ gap }) => gap), others: () => [], dashed: "; dashed: to the vehicle ahead", scale: ({ vehicles }) => vehicles.filter(({ isJudged }) => isJudged).map(({ gap }) => gap) },
+  { title: "Gap from the ego (m)", of: ({ vehicles }) => vehicles.map(({ gap }) => gap), others: () => [], dashed: "; dashed: to the vehicle ahead" },
   { title: "Speed (km/h); grey: other vehicles", of: ({ v }) => [kmh(v)], others: ({ vehicles }) => vehicles.map(({ v }) => kmh(v)) },
   { title: "TTC (s)", of: ({ ttc }) => [ttc], others: () => [], most: 10, threshold: "ttc" },
   { title: "BTN", of: ({ btn }) => [btn], others: () => [], most: 2, threshold: "btn" },
@@ -67,7 +67,8 @@ function drawTraces(canvas) {
   const { paint, width } = brush(canvas, (PANELS.length / across) * tall);
   const longest = traces.reduce((most, trace) => (trace.steps.length > most.steps.length ? trace : most));
   const until = Math.min(Math.max(...traces.map((trace) => decisive(trace, setting.thresholds))) + 2, longest.steps.at(-1).t) || 1;
-  PANELS.forEach(({ title, of, others, most, threshold, dashed = "", scale }, at) => {
+  const isPair = longest.steps[0].vehicles.length > 1;
+  PANELS.forEach(({ title, of, others, most, threshold, dashed }, at) => {
     const box = { x: (at % across) * (width / across) + 44, y: Math.floor(at / across) * tall + 22, w: width / across - 56, h: tall - 60 };
     const series = (steps, valuesOf) => valuesOf(steps[0]).map((_, which) => steps.filter(({ t }) => t <= until).map((step) => [step.t, valuesOf(step)[which]]));
     const lines = [
@@ -75,8 +76,9 @@ function drawTraces(canvas) {
       ...series(longest.steps, others).map((points, which) => [shade("--soft"), which ? [5, 3] : [], points]),
       ...traces.flatMap(({ colour, steps }) => series(steps, of).map((points, which) => [colour, which ? [5, 3] : [], points])),
     ];
-    const judged = scale ? traces.flatMap(({ steps }) => steps.filter(({ t }) => t <= until).flatMap(scale)) : [];
-    const finite = (judged.length ? judged : lines.flatMap(([, , points]) => points.map(([, value]) => value))).filter(Number.isFinite);
+    // Gaps to a vehicle that has driven away do not count.
+    const counting = ({ vehicles }) => vehicles.filter(({ isJudged }) => isJudged).map(({ gap }) => gap);
+    const finite = (dashed && isPair ? traces.flatMap(({ steps }) => steps.flatMap(counting)) : lines.flatMap(([, , points]) => points.map(([, value]) => value))).filter(Number.isFinite);
     const high = finite.reduce((top, value) => Math.max(top, value), 1);
     const [low, top] = [most ? 0 : finite.reduce((least, value) => Math.min(least, value), 0), most ? Math.min(high, most) : high];
     const [atX, atY] = [(t) => box.x + (t / until) * box.w, (value) => box.y + box.h - ((value - low) / (top - low)) * box.h];
@@ -86,6 +88,6 @@ function drawTraces(canvas) {
     clipped(paint, (path) => path.rect(box.x, box.y, box.w, box.h), () => lines.forEach(([colour, dash, points]) => line(paint, colour, 1.8, dash, draw(points))));
     frame(paint, box, [0, until], [low, top], atX, atY);
     Object.assign(paint, { textAlign: "left", textBaseline: "bottom" });
-    paint.fillText(title + (longest.steps[0].vehicles.length > 1 ? dashed : "") + (at + across >= PANELS.length ? ", over time (s)" : ""), box.x, box.y - 5, box.w);
+    paint.fillText(title + (isPair && dashed ? dashed : "") + (at + across >= PANELS.length ? ", over time (s)" : ""), box.x, box.y - 5, box.w);
   });
 }

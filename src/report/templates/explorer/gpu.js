@@ -20,11 +20,10 @@ function pipeline(code, entryPoint, types, constants) {
   return pipelines.get(key);
 }
 // After the drivers comes the ego that never reacts, which has the source of the first.
-const driverAt = (at) => data.drivers[at] ?? data.drivers[0];
 function lanePipeline(setting, at, part) {
   const constants = { ...setting.shared, ...setting.drivers[at], ...(part === "trace" ? data.traced : {}) };
   const types = ["uniform", INPUT, INPUT, INPUT, INPUT, ...Array(part === "trace" ? 2 : 3).fill("storage")];
-  return pipeline(data.source.shared + data.source[part] + driverAt(at).source, part, types, constants);
+  return pipeline(data.source.shared + data.source[part] + (data.drivers[at] ?? data.drivers[0]).source, part, types, constants);
 }
 // One computation with its buffers, each of contents or of a number of bytes.
 class Computation {
@@ -92,7 +91,7 @@ async function computeOutcomes(setting, at, points, starts, steps) {
 async function runCase(setting, at, { points, starts }, steps) {
   const [traced, outcomes] = await computeOutcomes(setting, at, points, starts, steps);
   const outcome = readOutcome(setting, outcomes);
-  return { ...driverAt(at), outcome, steps: readSteps(setting, traced, outcome.lastStep) };
+  return { ...data.drivers[at], outcome, steps: readSteps(setting, traced, outcome.lastStep) };
 }
 // The value of a BTN's quotient.
 const btnOf = ({ btn }, numerator, denominator) => btn.scale * (denominator === 0 ? Infinity : (numerator / denominator) ** (btn.isRoot ? 0.5 : 1));

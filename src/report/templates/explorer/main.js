@@ -16,7 +16,7 @@ function describeState() {
   const held = panel ? `precomputed map ${panelWords(panel)}` : [kindOf().label, ...sliderParameters().map(value)].join(", ");
   document.querySelector("header p").textContent = `Cells that fail ${label} under ${state.profile}: ${held}; ${state.drivers.length ? `drivers ${state.drivers.join(", ")}` : "no driver"}.`;
   const other = data.grids.find((grid) => kindOfGrid(grid) === kindOf() && !isComputable({ grid }));
-  $("cases").textContent = panel ? `Cases unlike those of the sliders: ${difference(panel.grid)}. A moved slider shows a map of plain cases, with other counts.`
+  $("cases").textContent = panel ? (isComputable(panel) ? "" : `Cases unlike those of the sliders: ${difference(panel.grid)}. A moved slider shows a map of plain cases, with other counts.`)
     : other ? `Plain cases. The precomputed maps have others: ${difference(other)}. Their counts differ.` : "";
 }
 // Greys what the page shows while it computes what the state says; what is changed meanwhile is computed next.
@@ -100,7 +100,7 @@ function buildControls() {
   choice($("profile"), data.profiles.filter((name) => settingOf(name)).map((name) => [name, name]), state.profile);
   choice($("panel"), [["", "none: computed here"], ...data.panels.map((panel, at) => [at, panelWords(panel)])], state.panel ?? "");
   for (const side of ["x", "y"]) {
-    choice($(side), kindOf().parameters.map((parameter) => [parameter.key, labelOf(parameter)]), state[side].key);
+    choice($(side), kindOf().parameters.map((parameter) => [parameter.key, parameter.label]), state[side].key);
     const [{ from, to }, axis] = [parameterOf(state[side].key), state[side]];
     const values = isPrecomputed() ? data.panels[state.panel].grid[side].values : axisValues(axis);
     for (const [end, min, max, value] of [["from", from, axis.to, values[0]], ["to", axis.from, to, values.at(-1)], ["cells", 2, 400, values.length]]) {

@@ -21,8 +21,8 @@ const isComputable = ({ grid }) => grid.isPlain && kindOfGrid(grid) && settingOf
 const isPrecomputed = () => state.panel !== null && !(device && isComputable(data.panels[state.panel]));
 const RUN_UP = "the lateral speed builds up in a run-up before the start, and a run of CCHDM ends once the vehicles overlap laterally at a large TTC";
 const STEPS = "the lateral position moves as in the JRC's simulator, step by step, from one step after the start";
-const difference = ({ cases, native_gap: native }) =>
-  [cases === "jrc-comparison" && RUN_UP, cases !== "plain" && STEPS, native && "each driver starts at its own gap"].filter(Boolean).join("; ") || "their profile or some of their values have no control here";
+const difference = ({ cases, category, native_gap: native }) =>
+  [cases === "jrc-comparison" && RUN_UP, cases !== "plain" && category !== "lvd" && STEPS, cases === "jrc" && category === "cut_out" && "a cut-out covers 4 m", native && "each driver starts at its own gap"].filter(Boolean).join("; ") || "their profile or some of their values have no control here";
 // The state of a panel of the program's maps, as far as the page has its parameters.
 function showPanel(at) {
   const { grid, values } = data.panels[at];

@@ -11,7 +11,6 @@ function brush(canvas, height) {
   paint.font = "12px 'DejaVu Sans', Verdana, Arial, sans-serif";
   return { paint, width };
 }
-// Round numbers in a range.
 function ticks(from, to, most) {
   if (from === to) { return [from]; }
   const rough = (to - from) / most;

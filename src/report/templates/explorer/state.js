@@ -57,8 +57,9 @@ function toAddress() {
 function refused(asked) {
   const shown = toAddress();
   const differing = asked.filter(([key, value]) => shown.get(key) !== value && !(shown.has(key) && Number(shown.get(key)) === Number(value)));
-  const instead = ([key]) => (shown.has(key) || parameterOf(key) ? `${key} ${shown.get(key) ?? valueOf(key)}` : `no ${key}`);
-  return differing.length ? `The link asks for ${differing.map(([key, value]) => `${key} ${value}`.trim()).join(", ")}; shown is ${differing.map(instead).join(", ")}.` : "";
+  const word = (key) => ({ x: "across", y: "up", at: "chosen case" })[key] ?? key;
+  const instead = ([key]) => (shown.has(key) || parameterOf(key) ? `${word(key)} ${shown.get(key) ?? valueOf(key)}` : `no ${word(key)}`);
+  return differing.length ? `The link asks for ${differing.map(([key, value]) => `${word(key)} ${value}`.trim()).join(", ")}; shown is ${differing.map(instead).join(", ")}.` : "";
 }
 // Reads the address as far as the page has what it names, and returns its fields; a link to a part of the page has none.
 function fromAddress() {
