@@ -1,5 +1,5 @@
-// The explorer of a map's page in a browser whose WebGPU runs on the processor: cells and traces against the program, every
-// control by keyboard, and the page without WebGPU. Arguments: the program, the browser, the pages.
+// The explorer of a map's page in a browser whose WebGPU runs on the processor: cells and traces against the program, what
+// the page says of them, every control by keyboard, and the page without WebGPU. Arguments: the program, the browser, the pages.
 import { execFileSync } from 'node:child_process';
 import { readFileSync, rmSync, statSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
@@ -36,6 +36,11 @@ async function open(flags, page, hash = '') {
   return { browser, tab };
 }
 
+async function go(tab, hash) {
+  await tab.evaluate((to) => { delete document.body.dataset.drawn; delete document.body.dataset.traced; location.hash = to; }, hash);
+  await tab.waitForFunction(() => document.body.dataset.drawn, { timeout: 300_000 });
+}
+
 // Random numbers, the same in every run (mulberry32).
 let seed = 157;
 function draw() {
@@ -68,8 +73,7 @@ async function againstProgram(tab, data) {
   let compared = 0;
   for (let setting = 0; setting < SETTINGS; setting += 1) {
     const hash = randomSetting(data);
-    await tab.evaluate((to) => { delete document.body.dataset.drawn; delete document.body.dataset.traced; location.hash = to; }, hash);
-    await tab.waitForFunction(() => document.body.dataset.drawn, { timeout: 300_000 });
+    await go(tab, hash);
     await tab.focus('#ex-map');
     await tab.keyboard.press('ArrowRight');
     for (let step = 0; step < setting % 3; step += 1) await tab.keyboard.press(among(['ArrowUp', 'ArrowDown', 'ArrowLeft']));
@@ -91,13 +95,13 @@ async function againstProgram(tab, data) {
     });
     if (!shown.isCase) { console.log(`no such case: ${shown.command}`); continue; }
     compared += 1;
-    const args = shown.command.split(' ').slice(1);
+    const args = shown.command.replace(' --sheet case.html', '').split(' ').slice(1);
     const answer = JSON.parse(run([...args, '--format', 'json', '--accept-implausible']));
     const theirs = answer.profiles[0].models.map((of) => of.collision + 2 * of.ttc + 4 * of.btn);
     check(String(theirs) === String(shown.bits.map((bits) => bits & 7)), `cell = check (${theirs}): ${shown.command}`);
     check(String(theirs) === String(shown.outcomes.map((bits) => bits & 7)), 'trace = check');
     const nominal = answer.profiles[0].nominal_answer;
-    check(nominal === null || shown.answer.toLowerCase().startsWith(nominal), `${shown.answer} = ${nominal}`);
+    check(nominal === null || shown.answer.includes(`At exactly these values: ${nominal}`), `${shown.answer} = ${nominal}`);
     if (setting % 4 === 0) againstSimulate(args, shown, data.drivers.map((of) => of.name));
   }
   check(compared >= SETTINGS / 2, `${compared} of ${SETTINGS} settings were cases`);
@@ -138,6 +142,74 @@ function againstSimulate(args, shown, names) {
   });
 }
 
+// What a reader sees: texts by their ids, the chosen cell, and whether the page computes.
+const seen = (tab) => tab.evaluate(() => {
+  const text = (id) => document.getElementById(`ex-${id}`).textContent;
+  const { map, cursor } = document.getElementById('ex-map').shown;
+  const [lead, notice] = [document.querySelector('header p').textContent, document.getElementById('ex-notice')];
+  const { top, bottom } = document.getElementById('ex-words').getBoundingClientRect();
+  const ends = ['x-from', 'x-to', 'x-cells', 'y-from', 'y-to', 'y-cells'].map((id) => Number(document.getElementById(`ex-${id}`).value));
+  return { lead, notice: notice.hidden ? '' : notice.textContent, cases: text('cases'), key: text('key'), cell: text('cell'), answer: text('answer'), ends,
+    chosen: cursor && [map.xs[cursor.i], map.ys[cursor.j]], isInView: top > 0 && bottom <= innerHeight, hash: location.hash };
+});
+
+// A precomputed map with other cases than those of the sliders.
+async function ofOtherCases(tab) {
+  const before = await seen(tab);
+  check(before.ends[3] === 0 && before.ends[4] === 1.7, `the axis shows its values: ${before.ends}`);
+  check(/run-up/.test(before.cases) && /outcomes only/.test(before.cell), `it says what its cases are: ${before.cases}`);
+  const busy = await tab.evaluate(() => {
+    delete document.body.dataset.drawn;
+    const range = document.getElementById('ex-value-ego_speed_kmh');
+    range.value = 25;
+    range.dispatchEvent(new Event('input'));
+    const canvas = document.getElementById('ex-map');
+    const { x, y, width, height } = canvas.getBoundingClientRect();
+    canvas.dispatchEvent(new PointerEvent('pointermove', { clientX: x + width / 2, clientY: y + height / 2 }));
+    return [document.getElementById('ex-time').textContent, document.getElementById('ex-picture').ariaBusy, String(canvas.shown.cursor)];
+  });
+  check(String(busy) === 'computing …,true,null', `while it computes: ${busy}`);
+  await tab.waitForFunction(() => document.body.dataset.drawn && document.getElementById('ex-picture').ariaBusy === 'false', { timeout: 300_000 });
+  const after = await seen(tab);
+  check(/^Plain.*run-up/.test(after.cases) && after.lead.includes('ego 25 km/h'), `it says that its cases are others: ${after.cases}`);
+  await tab.evaluate(() => document.querySelector('input[value=ttc]').click());
+  check(/fail TTC under jrc-2021/.test((await seen(tab)).lead), 'the first sentence follows the criterion');
+}
+
+// Links: what the page has not, the chosen case, and where the ticks of the map stand.
+async function byLink(tab) {
+  const broken = '#kind=cut-in&profile=nope&ego_speed_kmh=abc&other_speed_kmh=30&x=gap_m_to_10_to_20_to_6&y=lateral_speed_mps_to_1_to_1.4_to_5&at=14,1.2';
+  await go(tab, broken);
+  const { notice, hash, chosen, cell, ends } = await seen(tab);
+  check(/profile nope, ego_speed_kmh abc.*jrc-2021/.test(notice) && hash === broken, `a broken link: ${notice}`);
+  check(String(chosen) === '14,1.2' && /14 m.*1.2 m/.test(cell) && String(ends) === '10,20,6,1,1.4,5', `the chosen cell of a link: ${chosen}`);
+  const ticks = await tab.evaluate(() => {
+    const canvas = document.getElementById('ex-map');
+    const [wide, ratio] = [canvas.parentElement.clientWidth - 66, devicePixelRatio];
+    const row = canvas.getContext('2d').getImageData(0, Math.round((canvas.height / ratio - 48) * ratio), canvas.width, 1).data;
+    // In cells; a tick begins where a pixel is dark.
+    return [...Array(canvas.width).keys()].filter((x) => row[4 * x + 3] > 100 && !(row[4 * x - 1] > 100)).map((x) => (6 * (x / ratio - 56)) / wide);
+  });
+  const wanted = ticks.map((_, at) => 0.5 + (5 * at) / (ticks.length - 1));
+  check(ticks.length > 5 && ticks.every((tick, at) => Math.abs(tick - wanted[at]) < 0.03), `ticks stand in the middle of their cells: ${ticks.map((tick) => tick.toFixed(2))}`);
+  await go(tab, '#foo');
+  check(/foo/.test((await seen(tab)).notice), 'a link to nothing');
+  await tab.evaluate(() => { scrollTo(0, 0); delete document.body.dataset.traced; });
+  await tab.focus('#ex-map');
+  await tab.keyboard.press('ArrowUp');
+  await tab.keyboard.press('Enter');
+  await tab.waitForFunction(() => document.body.dataset.traced, { timeout: 300_000 });
+  check((await seen(tab)).isInView, 'Enter brings the case into view');
+}
+
+// A cell of a cut-out in which vehicles drive through one another.
+async function throughOneAnother(tab) {
+  const { ends, key } = await seen(tab);
+  await go(tab, `${(await seen(tab)).hash || '#kind=cut-out&thw_s=2&start=thw_s&x=ahead_gap_m_to_2_to_60_to_30&y=lateral_speed_mps_to_0.1_to_1.8_to_18&ego_speed_kmh=10'}&at=${ends[0]},${ends[3]}`);
+  const { answer } = await seen(tab);
+  check(/drives through the one ahead/.test(key) && /^No such traffic: .*drives through the one ahead/.test(answer), `traffic that there is not: ${answer}`);
+}
+
 async function byKeyboard(tab) {
   const wanted = await tab.evaluate(() => {
     const controls = [...document.querySelectorAll('#explorer :is(input, select, button, canvas[tabindex])')];
@@ -166,13 +238,18 @@ for (const [at, page] of pages.entries()) {
   check(!/differ/.test(state.agreement), `the program's map: ${state.agreement}`);
   console.log(`first picture: ${state.drawn} ms`);
   if (at === 0) {
+    await ofOtherCases(tab);
+    await byLink(tab);
     await againstProgram(tab, state.data);
     await byKeyboard(tab);
+  } else {
+    await throughOneAnother(tab);
   }
   await browser.close();
-  const without = await open(['--disable-gpu'], page);
-  const seen = await without.tab.evaluate(() => document.getElementById('ex-status').textContent + document.getElementById('ex-key').textContent);
-  check(seen.includes('no WebGPU') && seen.includes('fails in'), 'without WebGPU the page shows the program\'s map');
+  const without = await open(['--disable-gpu'], page, '#kind=lvd&panel=0');
+  const shown = await without.tab.evaluate(() => document.getElementById('ex-status').textContent + document.getElementById('ex-key').textContent);
+  check(shown.includes('no WebGPU') && shown.includes('fails in'), 'without WebGPU the page shows the program\'s map');
+  check(/kind lvd; shown is/.test((await seen(without.tab)).notice), 'without WebGPU it says what a link asked for');
   await without.browser.close();
 }
 // A page whose time step is another one must say that its lanes differ.

@@ -146,7 +146,7 @@ pub static NUMBERS: [CaseNumber; 16] = [
     number!(AheadSpeed ahead_speed, "Cut-out: speed of the vehicle ahead of the cutting-out one, with its unit [default: 0]", "Speed of the vehicle ahead",
         [("ahead_speed_mps", "m/s", 1.0), ("ahead_speed_kmh", "km/h", KMH)] (0.0, 150.0), Some(Quantity::Speed), CUT_OUT,
         ("vehicle ahead", SPEED_ERROR_MPS, "0.1 km/h")),
-    number!(AheadGap ahead_gap, "Cut-out: gap between the two, bumper to bumper", "Gap to the vehicle ahead",
+    number!(AheadGap ahead_gap, "Cut-out: gap between the two, bumper to bumper", "Gap ahead of the other vehicle",
         [("ahead_gap_m", "m", 1.0)] (0.0, 1e4), Some(Quantity::Gap), CUT_OUT, ("gap of the vehicle ahead", GAP_ERROR_M, "1 cm")),
     number!(Length length, "Length of every vehicle [default: the profile's]", "Length of the vehicles",
         [("length_m", "m", 1.0)] (0.1, 50.0), Some(Quantity::Length), EVERY, ("length", GAP_ERROR_M, "1 cm")),

@@ -1,33 +1,32 @@
 // One case: the drivers' answers in words, its command, and its course over time.
 const seconds = (value) => `${value.toFixed(2)} s`;
 const kmh = (speed) => speed * parameterOf("ego_speed_kmh").perSi;
-
 function sentence(name, { bits, contact, reaction, end, impact, closing, ttc, btn }, thresholds) {
   const reacts = reaction === null ? "does not react" : `reacts at ${seconds(reaction)}`;
-  const collides = () => `and collides ${["", "from the side", "frontally"][contact]} at ${seconds(end)}, driving ${kmh(impact).toFixed(1)} km/h, closing in at ${kmh(closing).toFixed(1)} km/h`;
+  const collides = () => `and collides (${["", "side", "rear-end"][contact]} contact) at ${seconds(end)}, driving ${kmh(impact).toFixed(1)} km/h, closing in at ${kmh(closing).toFixed(1)} km/h`;
   const ends = bits & 1 ? collides() : bits & 8 ? "and has not collided when the run ends" : "and does not collide";
   const near = Number.isFinite(ttc) ? `smallest TTC ${seconds(ttc)}${bits & 2 ? ` (fails: below ${thresholds.ttc} s)` : ""}` : "no TTC";
-  return `${name} ${reacts} ${ends}; ${near}, largest BTN ${Number.isFinite(btn) ? btn.toFixed(2) : "infinite"}${bits & 4 ? ` (fails: above ${thresholds.btn}, or a contact)` : ""}.`;
+  const fails = bits & 4 ? ` (fails: ${btn > thresholds.btn ? `above ${thresholds.btn}` : "a contact"})` : "";
+  const braking = btn > 1 && !(bits & 1) ? "; a BTN above 1 does not contradict an avoided collision" : "";
+  return `${name} ${reacts} ${ends}; ${near}, largest BTN ${Number.isFinite(btn) ? btn.toFixed(2) : "infinite"}${fails}${braking}.`;
 }
-// The answer as `check` computes it, before it examines how robust it is.
+// The answer as `check` computes it, before it examines how robust it is: at exactly these values.
 function answerOf({ references, settles }, unreacting, collides) {
   const avoiding = references.filter((name) => !collides(name));
-  if (!references.length) { return "The profile has no reference drivers, which would say what is preventable."; }
-  if (!(unreacting & 1)) { return unreacting & 8 && settles ? "Undecided: the run ends before anything happens." : "No conflict: nothing collides even if the ego never reacts."; }
-  return avoiding.length ? `Preventable: ${avoiding.join(" and ")} ${avoiding.length > 1 ? "avoid" : "avoids"} the collision.` : `Not preventable: ${references.join(" and ")} collide.`;
+  if (!references.length) { return "the profile has no reference drivers, which would say what is preventable."; }
+  if (!(unreacting & 1)) { return unreacting & 8 && settles ? "undecided: the run ends before anything happens." : "no conflict: nothing collides even if the ego never reacts."; }
+  return avoiding.length ? `preventable: ${avoiding.join(" and ")} ${avoiding.length > 1 ? "avoid" : "avoids"} the collision.` : `not preventable: ${references.join(" and ")} collide.`;
 }
 // The case of these values on the axes: the numbers of its point, and its start.
 function caseAt(x, y) {
   const valueAt = (key) => valueOf(key, { [state.x.key]: x, [state.y.key]: y });
-  const points = new Float32Array(kindOf().parameters.filter(({ start }) => start === null).map(({ key, perSi }) => valueAt(key) / perSi));
+  const points = kindOf().parameters.filter(({ start }) => start === null).map(({ key, perSi }) => valueAt(key) / perSi);
   const { key, start, perSi } = parameterOf(startKey());
   return { points, starts: [[start, valueAt(key) / perSi]], valueAt };
 }
-
 function commandOf({ valueAt }) {
-  const given = kindOf().parameters.filter(({ start, key }) => start === null || key === startKey());
-  const flags = given.map(({ key, flag, suffix, sign }) => `--${flag} ${decimal(sign * valueAt(key))}${suffix}`);
-  return ["lanesweep check --category", kindOf().category, ...flags, ...data.sizes, `--profiles ${state.profile}`].join(" ");
+  const flags = given().map(({ key, flag, suffix, sign }) => `--${flag} ${decimal(sign * valueAt(key))}${suffix}`);
+  return ["lanesweep check --category", kindOf().category, ...flags, ...data.sizes, `--profiles ${state.profile} --sheet case.html`].join(" ");
 }
 // The steps that a lane wrote. TTC and BTN are those of the vehicles that the criteria evaluate.
 function readSteps(setting, bytes, lastStep) {
@@ -38,28 +37,38 @@ function readSteps(setting, bytes, lastStep) {
       { v: values[of], gap: values[of + 1], lateral: values[of + 2], ttc: values[of + 4], btn: btnOf(setting, values[of + 5], values[of + 6]), isJudged: words[of + 7] & 2 }));
     const judged = vehicles.filter(({ isJudged }) => isJudged);
     const worst = (better, key) => (judged.length ? better(...judged.map((of) => of[key])) : NaN);
-    return { t: at * setting.dt, v: values[first], isUnsafe: words[first + 2] === 1, vehicles, ttc: worst(Math.min, "ttc"), btn: worst(Math.max, "btn") };
+    return { t: at * setting.dt, v: values[first], isUnsafe: words[first + 2] === 1, vehicles, gap: worst(Math.min, "gap"), ttc: worst(Math.min, "ttc"), btn: worst(Math.max, "btn") };
   });
+}
+// The last time at which a driver decides or is decided, as in the sheet of `check`.
+function decisive({ steps, outcome: { bits, reaction, end } }, { ttc, btn }) {
+  const changed = steps.findLast(({ v }) => Math.abs(kmh(v - steps.at(-1).v)) > 1)?.t ?? 0;
+  // The first time near the worst value, if that is near its threshold.
+  const first = (valueOf, limit, slack) => {
+    const least = steps.map(valueOf).reduce((least, value) => (value < least ? value : least), Infinity);
+    return Number.isFinite(least) && least <= limit ? steps.find((step) => valueOf(step) <= least + slack(least)).t : 0;
+  };
+  return Math.max(reaction ?? 0, bits & 1 ? end : 0, changed, first(({ gap }) => gap, Infinity, (least) => Math.max(0.01, least / 20)),
+    first((step) => step.ttc, 10 * ttc, (least) => least / 20), first((step) => -step.btn, -btn / 10, (least) => -least / 20));
 }
 // Of the panels over time, the values of a driver, and of the other vehicles, which are the same for all.
 const PANELS = [
-  { title: "Gap (m); dashed: to the vehicle ahead", of: ({ vehicles }) => vehicles.map(({ gap }) => gap), others: () => [] },
+  { title: "Gap from the ego (m)", of: ({ vehicles }) => vehicles.map(({ gap }) => gap), others: () => [], dashed: "; dashed: to the vehicle ahead" },
   { title: "Speed (km/h); grey: other vehicles", of: ({ v }) => [kmh(v)], others: ({ vehicles }) => vehicles.map(({ v }) => kmh(v)) },
   { title: "TTC (s)", of: ({ ttc }) => [ttc], others: () => [], most: 10, threshold: "ttc" },
   { title: "BTN", of: ({ btn }) => [btn], others: () => [], most: 2, threshold: "btn" },
 ];
-const isShown = ({ name }) => state.drivers.includes(name);
-
+const chosen = (traces) => traces.filter(({ name }) => state.drivers.includes(name));
 function drawTraces(canvas) {
   const { setting, traces: all = [] } = canvas.shown ?? {};
-  const traces = all.filter(isShown);
-  if (!traces.length) { return; }
+  const traces = chosen(all);
+  if (!traces.length) { brush(canvas, 0); return; }
   const [across, tall] = [canvas.parentElement.clientWidth > 640 ? 2 : 1, 210];
   const { paint, width } = brush(canvas, (PANELS.length / across) * tall);
-  const changes = ({ steps }) => steps.findLast((step, at) => at > 0 && (step.v !== steps[at - 1].v || step.vehicles.some(({ v, lateral }, of) => v !== steps[at - 1].vehicles[of].v || lateral !== steps[at - 1].vehicles[of].lateral)))?.t ?? 0;
   const longest = traces.reduce((most, trace) => (trace.steps.length > most.steps.length ? trace : most));
-  const until = Math.max(Math.min(Math.max(...traces.map(changes)) + 2, longest.steps.at(-1).t), 1);
-  PANELS.forEach(({ title, of, others, most, threshold }, at) => {
+  const until = Math.min(Math.max(...traces.map((trace) => decisive(trace, setting.thresholds))) + 2, longest.steps.at(-1).t) || 1;
+  const isPair = longest.steps[0].vehicles.length > 1;
+  PANELS.forEach(({ title, of, others, most, threshold, dashed }, at) => {
     const box = { x: (at % across) * (width / across) + 44, y: Math.floor(at / across) * tall + 22, w: width / across - 56, h: tall - 60 };
     const series = (steps, valuesOf) => valuesOf(steps[0]).map((_, which) => steps.filter(({ t }) => t <= until).map((step) => [step.t, valuesOf(step)[which]]));
     const lines = [
@@ -67,16 +76,18 @@ function drawTraces(canvas) {
       ...series(longest.steps, others).map((points, which) => [shade("--soft"), which ? [5, 3] : [], points]),
       ...traces.flatMap(({ colour, steps }) => series(steps, of).map((points, which) => [colour, which ? [5, 3] : [], points])),
     ];
-    const finite = lines.flatMap(([, , points]) => points.map(([, value]) => value)).filter(Number.isFinite);
+    // Gaps to a vehicle that has driven away do not count.
+    const counting = ({ vehicles }) => vehicles.filter(({ isJudged }) => isJudged).map(({ gap }) => gap);
+    const finite = (dashed && isPair ? traces.flatMap(({ steps }) => steps.flatMap(counting)) : lines.flatMap(([, , points]) => points.map(([, value]) => value))).filter(Number.isFinite);
     const high = finite.reduce((top, value) => Math.max(top, value), 1);
     const [low, top] = [most ? 0 : finite.reduce((least, value) => Math.min(least, value), 0), most ? Math.min(high, most) : high];
     const [atX, atY] = [(t) => box.x + (t / until) * box.w, (value) => box.y + box.h - ((value - low) / (top - low)) * box.h];
-    const stroke = (points) => points.forEach(([t, value], of) => {
-      if (Number.isFinite(value)) { paint[Number.isFinite(points[of - 1]?.[1]) ? "lineTo" : "moveTo"](atX(t), atY(value)); }
+    const draw = (points) => (path) => points.forEach(([t, value], of) => {
+      if (Number.isFinite(value)) { path[Number.isFinite(points[of - 1]?.[1]) ? "lineTo" : "moveTo"](atX(t), atY(value)); }
     });
-    clipped(paint, () => paint.rect(box.x, box.y, box.w, box.h), () => lines.forEach(([colour, dash, points]) => line(paint, colour, 1.8, dash, () => stroke(points))));
+    clipped(paint, (path) => path.rect(box.x, box.y, box.w, box.h), () => lines.forEach(([colour, dash, points]) => line(paint, colour, 1.8, dash, draw(points))));
     frame(paint, box, [0, until], [low, top], atX, atY);
     Object.assign(paint, { textAlign: "left", textBaseline: "bottom" });
-    paint.fillText(title + (at + across >= PANELS.length ? ", over time (s)" : ""), box.x, box.y - 5, box.w);
+    paint.fillText(title + (isPair && dashed ? dashed : "") + (at + across >= PANELS.length ? ", over time (s)" : ""), box.x, box.y - 5, box.w);
   });
 }

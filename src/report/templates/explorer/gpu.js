@@ -1,13 +1,10 @@
 // The device: the program's own shaders and constants, as WebGPU pipelines.
 const [WORKGROUP, RECORD, TRACED_STEP, INPUT] = [64, 14, 19, "read-only-storage"];
-let [device, adapterName] = [null, ""];
-const pipelines = new Map();
-
+let [device, adapterName, pipelines] = [null, "", new Map()];
 async function openDevice() {
   const adapter = await navigator.gpu?.requestAdapter({ powerPreference: "high-performance" });
   device = (await adapter?.requestDevice()) ?? null;
-  const { vendor, architecture, description } = adapter?.info ?? {};
-  adapterName = [vendor, architecture, description].filter(Boolean).join(" ");
+  adapterName = ["vendor", "architecture", "description"].map((key) => adapter?.info?.[key]).filter(Boolean).join(" ");
   device?.addEventListener("uncapturederror", (event) => complain(event.error.message));
   device?.lost.then(({ message }) => { device = null; complain(`The device was lost: ${message}`); });
 }
@@ -17,39 +14,32 @@ function pipeline(code, entryPoint, types, constants) {
   if (!pipelines.has(key)) {
     const entries = types.map((type, binding) => ({ binding, visibility: GPUShaderStage.COMPUTE, buffer: { type } }));
     const group = device.createBindGroupLayout({ entries });
-    const compute = { module: device.createShaderModule({ code }), entryPoint, constants };
-    const compiled = device.createComputePipelineAsync({ layout: device.createPipelineLayout({ bindGroupLayouts: [group] }), compute });
-    pipelines.set(key, compiled.then((made) => ({ made, group })));
+    const [layout, module] = [device.createPipelineLayout({ bindGroupLayouts: [group] }), device.createShaderModule({ code })];
+    pipelines.set(key, device.createComputePipelineAsync({ layout, compute: { module, entryPoint, constants } }).then((made) => ({ made, group })));
   }
   return pipelines.get(key);
 }
 // After the drivers comes the ego that never reacts, which has the source of the first.
-const driverAt = (at) => data.drivers[at] ?? data.drivers[0];
 function lanePipeline(setting, at, part) {
   const constants = { ...setting.shared, ...setting.drivers[at], ...(part === "trace" ? data.traced : {}) };
   const types = ["uniform", INPUT, INPUT, INPUT, INPUT, ...Array(part === "trace" ? 2 : 3).fill("storage")];
-  return pipeline(data.source.shared + data.source[part] + driverAt(at).source, part, types, constants);
+  return pipeline(data.source.shared + data.source[part] + (data.drivers[at] ?? data.drivers[0]).source, part, types, constants);
 }
-const generatorPipeline = (setting, entry) =>
-  pipeline(data.source.generator, entry, ["uniform", INPUT, INPUT, INPUT, "storage", "storage", "storage"], setting.generator);
-// One computation: its buffers go with it.
+// One computation with its buffers, each of contents or of a number of bytes.
 class Computation {
   buffers = [];
   encoder = device.createCommandEncoder();
-  // A buffer of these contents, or of this many bytes.
   buffer(contents, usage = GPUBufferUsage.STORAGE | GPUBufferUsage.COPY_SRC | GPUBufferUsage.COPY_DST) {
-    const isSize = typeof contents === "number";
-    const made = device.createBuffer({ size: Math.max(isSize ? contents : contents.byteLength, 16), usage });
-    if (!isSize) { device.queue.writeBuffer(made, 0, contents); }
+    const made = device.createBuffer({ size: Math.max(contents.byteLength ?? contents, 16), usage });
+    if (contents.byteLength) { device.queue.writeBuffer(made, 0, contents); }
     this.buffers.push(made);
     return made;
   }
-  uniform(words) { return this.buffer(new Uint32Array(words), GPUBufferUsage.UNIFORM | GPUBufferUsage.COPY_DST); }
+  uniform = (...words) => this.buffer(new Uint32Array(words), GPUBufferUsage.UNIFORM | GPUBufferUsage.COPY_DST);
   dispatch({ made, group }, buffers, invocations) {
-    const entries = buffers.map((buffer, binding) => ({ binding, resource: { buffer } }));
     const pass = this.encoder.beginComputePass();
     pass.setPipeline(made);
-    pass.setBindGroup(0, device.createBindGroup({ layout: group, entries }));
+    pass.setBindGroup(0, device.createBindGroup({ layout: group, entries: buffers.map((buffer, binding) => ({ binding, resource: { buffer } })) }));
     pass.dispatchWorkgroups(Math.ceil(invocations / WORKGROUP));
     pass.end();
   }
@@ -64,24 +54,18 @@ class Computation {
   }
   // Cases of points, which have as many numbers as the kind, and the starts of every case's lanes.
   async cases(setting, points, starts) {
-    const dimensions = setting.generator.recipe_dimensions;
-    const count = points.length / dimensions;
-    const numbers = new Float32Array(points.length + dimensions);
-    numbers.set(points);
+    const count = points.length / setting.generator.recipe_dimensions;
+    const numbers = new Float32Array([...points, ...Array(setting.generator.recipe_dimensions).fill(0)]);
     const [cases, samples] = [this.buffer(count * data.caseWords * 4), this.buffer(count * 8)];
-    const generation = this.uniform([0, 0, count, 0, 0, 0, count, 0, points.length, 0, 0, 0]);
-    const bound = [generation, this.buffer(new Uint32Array(setting.recipe)), this.buffer(numbers), this.buffer(16), cases, this.buffer(16), samples];
-    for (const entry of ["generate", "mark_traffic"]) { this.dispatch(await generatorPipeline(setting, entry), bound, count); }
-    const words = new Uint32Array(starts.map(([kind]) => [kind, 0]).flat());
-    starts.forEach(([, value], at) => { new Float32Array(words.buffer)[2 * at + 1] = value; });
+    const bound = [this.uniform(0, 0, count, 0, 0, 0, count, 0, points.length, 0, 0, 0), this.buffer(new Uint32Array(setting.recipe)), this.buffer(numbers), this.buffer(16), cases, this.buffer(16), samples];
+    const types = ["uniform", INPUT, INPUT, INPUT, "storage", "storage", "storage"];
+    for (const entry of ["generate", "mark_traffic"]) { this.dispatch(await pipeline(data.source.generator, entry, types, setting.generator), bound, count); }
+    const words = new Uint32Array(starts.flatMap(([kind, value]) => [kind, ...new Uint32Array(Float32Array.of(value).buffer)]));
     return { samples, lanes: count * starts.length, inputs: [cases, this.buffer(words), this.buffer(16), this.buffer(16)] };
   }
-  launch({ shared }, lanes, headways, driver = 0, firstWord = 0) {
-    return this.uniform([lanes, headways, 0, 1, 0, 0, firstWord, 0, driver, WORKGROUP, shared.frame_longest_burst >> 1, 0]);
-  }
+  launch = ({ shared }, lanes, headways, driver = 0, firstWord = 0) => this.uniform(lanes, headways, 0, 1, 0, 0, firstWord, 0, driver, WORKGROUP, shared.frame_longest_burst >> 1, 0);
 }
-// Verdict bits of every lane for each driver and the ego that never reacts; the lanes of a case are neighbours. `impossible`
-// of a lane: 1 no such traffic, 2 no such case.
+// Verdict bits of every lane for each driver and the ego that never reacts, and whether it is no such traffic (1) or case (2).
 async function computeVerdicts(setting, points, starts) {
   const compiled = await Promise.all(setting.drivers.map((_, at) => lanePipeline(setting, at, "lanes")));
   const all = new Computation();
@@ -102,26 +86,26 @@ async function computeOutcomes(setting, at, points, starts, steps) {
   const { lanes, inputs } = await all.cases(setting, points, starts);
   const results = [all.buffer(Math.max(steps, 1) * TRACED_STEP * 4), all.buffer(lanes * RECORD * 4)];
   all.dispatch(compiled, [all.launch(setting, lanes, starts.length), ...inputs, ...results], lanes);
-  const [traced, outcomes] = await all.read(results);
-  return { traced, outcomes };
+  return all.read(results);
+}
+async function runCase(setting, at, { points, starts }, steps) {
+  const [traced, outcomes] = await computeOutcomes(setting, at, points, starts, steps);
+  const outcome = readOutcome(setting, outcomes);
+  return { ...data.drivers[at], outcome, steps: readSteps(setting, traced, outcome.lastStep) };
 }
 // The value of a BTN's quotient.
 const btnOf = ({ btn }, numerator, denominator) => btn.scale * (denominator === 0 ? Infinity : (numerator / denominator) ** (btn.isRoot ? 0.5 : 1));
-
 function readOutcome(setting, bytes) {
   const [words, values] = [new Uint32Array(bytes), new Float32Array(bytes)];
   const time = (step) => (step === 0xffffffff ? null : step * setting.dt);
-  return {
-    bits: words[0] & 15, contact: (words[0] >> 4) & 3, reaction: time(words[1]), end: time(words[2]), lastStep: words[2],
-    impact: values[3], closing: values[4], ttc: values[5], btn: btnOf(setting, values[6], values[7]), gap: values[8],
-  };
+  const whole = { bits: words[0] & 15, contact: (words[0] >> 4) & 3, reaction: time(words[1]), end: time(words[2]), lastStep: words[2] };
+  return { ...whole, impact: values[3], closing: values[4], ttc: values[5], btn: btnOf(setting, values[6], values[7]) };
 }
-// The drivers whose lanes have other words than the program computed.
+// The drivers whose lanes have other words than the program computed, but for the quotient of the BTN.
 async function differingDrivers(setting) {
   const { points, starts, hashes } = setting.known;
   const isEqual = await Promise.all(data.drivers.map(async (_, at) => {
-    const { outcomes } = await computeOutcomes(setting, at, new Float32Array(points), starts, 0);
-    // But for the quotient of the BTN.
+    const [, outcomes] = await computeOutcomes(setting, at, points, starts, 0);
     const words = new Uint32Array(outcomes).filter((_, word) => word % RECORD !== 6 && word % RECORD !== 7);
     return hashes[at] === words.reduce((hash, word) => Math.imul(hash ^ word, data.hash.prime) >>> 0, data.hash.basis);
   }));
