@@ -58,7 +58,7 @@ fn the_software_device_is_listed_but_taken_only_by_name() {
     assert!(text.contains(name.split(' ').next().unwrap()) && text.contains("software"), "{text}");
     assert!(text.lines().all(|line| line.chars().count() <= 120), "{text}");
     assert!(text.lines().count() == adapters.cards().len() + 1 && text.contains("exact path"), "{text}");
-    let named = choose(adapters.cards(), BackendChoice::Gpu, Some(&name.parse().unwrap()));
+    let named = choose(adapters.cards(), BackendChoice::Gpu, Some(name));
     assert_eq!(named.unwrap(), Some(index));
     let auto = choose(adapters.cards(), BackendChoice::Auto, None).unwrap();
     assert!(auto.is_none_or(|auto| adapters.cards()[auto].is_real()));

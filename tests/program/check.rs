@@ -107,7 +107,7 @@ fn a_sheet_names_program_and_profile_and_a_comment_is_no_other_profile() {
     };
     assert_eq!(sources(&ours).1, Vec::<String>::new());
     assert_eq!(sources(&other), (sources(&ours).0, vec!["cchdm.delay_s".to_owned()]));
-    let none = "no source recorded: the profile&#x27;s own value";
+    let none = "no source recorded: the profile&apos;s own value";
     assert!(!page.contains(none) && other_page.contains(none));
     let program = ours["program"].as_str().unwrap();
     let commit = ours["identity"]["commit"].as_str().map_or("unknown", |commit| commit);

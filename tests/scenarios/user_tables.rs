@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use arrow_array::{ArrayRef, BooleanArray, Date32Array, Float64Array, Int32Array, StringArray};
-use lanesweep::scenario::{Category, Scenario, Side, read_scenario_file, read_scenarios};
+use lanesweep::scenario::{Category, Scenario, Side, read_scenarios};
 use parquet::basic::Compression;
 
 fn file(dir: &Path, name: &str, content: &str) -> PathBuf {
