@@ -18,7 +18,7 @@ pub(super) fn to_readable_json(value: &impl Serialize) -> Result<Vec<u8>> {
         if !in_text && matches!(c, ']' | '}') {
             open.pop();
         }
-        if !in_text && c == '}' {
+        if !in_text && (c == '}' || before == '{') {
             text += &line(open.len());
         }
         text.push(c);
@@ -29,7 +29,6 @@ pub(super) fn to_readable_json(value: &impl Serialize) -> Result<Vec<u8>> {
         }
         match c {
             _ if in_text => {}
-            '{' => text += &line(open.len()),
             ',' if open.last() == Some(&'{') || matches!(before, ']' | '}') => text += &line(open.len()),
             ',' | ':' => text.push(' '),
             _ => {}
