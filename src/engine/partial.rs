@@ -52,20 +52,16 @@ impl Partial {
         if u32::try_from(plan.headways.len()).is_err() {
             return Err(Error::Internal("a unit has more headways than u32 counts".to_owned()));
         }
-        Ok(Partial::empty(plan).counting(plan, chunk))
-    }
-
-    /// An empty partial with the counts of a chunk.
-    fn counting(mut self, plan: &LanePlan, chunk: &Chunk) -> Partial {
+        let mut counted = Partial::empty(plan);
         let mut at = 0;
         for (index, inside) in plan.segments(chunk.units.clone()) {
             let block = &plan.blocks[index];
             let first_cell: usize = plan.blocks[..index].iter().map(|before| plan.headway_cells(before)).sum();
-            let failures = &mut self.headway_failures[first_cell..first_cell + plan.headway_cells(block)];
+            let failures = &mut counted.headway_failures[first_cell..first_cell + plan.headway_cells(block)];
             let per_unit = plan.lanes_per_unit(block) as usize;
             for unit in inside {
                 let lanes = &chunk.verdicts[at..at + per_unit];
-                self.units.push(count_unit(plan, block.first_unit + unit, block.variants.len(), lanes));
+                counted.units.push(count_unit(plan, block.first_unit + unit, block.variants.len(), lanes));
                 // Lanes are in the order of the cells: variant, headway, model.
                 for (lane, cells) in lanes.iter().zip(failures.chunks_mut(Criterion::ALL.len())) {
                     Criterion::ALL.iter().zip(cells).for_each(|(c, cell)| *cell += u64::from(lane.failed(*c)));
@@ -73,7 +69,7 @@ impl Partial {
                 at += per_unit;
             }
         }
-        self
+        Ok(counted)
     }
 
     /// Merges the counts of other units of the same plan: associative and commutative.

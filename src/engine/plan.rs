@@ -183,6 +183,7 @@ impl Block {
 }
 
 /// The lanes of a sweep.
+#[derive(Clone)]
 pub struct LanePlan {
     /// Profile, with the time step.
     pub profile: Profile,
@@ -274,14 +275,7 @@ impl LanePlan {
     /// cases.
     pub fn holding(&self, units: Vec<Units>, source: Arc<dyn CaseSource>) -> LanePlan {
         let blocks = self.blocks.iter().zip(units).map(|(block, units)| Block { units, ..block.clone() });
-        LanePlan {
-            profile: self.profile.clone(),
-            models: self.models.clone(),
-            headways: self.headways.clone(),
-            blocks: blocks.collect(),
-            source,
-            hash: self.hash.clone(),
-        }
+        LanePlan { blocks: blocks.collect(), source, ..self.clone() }
     }
 
     /// The case of a unit's variant.

@@ -156,44 +156,54 @@ impl Motion<f64> {
     /// Encodes a described motion at time step `dt_s`; sampled series go to the end of `tables`.
     pub fn encode(speed: &Speed, lateral: &Lateral, dt_s: f64, tables: &mut Tables<f64>) -> Self {
         let mut motion = Motion::default();
+        motion.set_speed(speed, dt_s, tables);
+        motion.set_lateral(lateral, dt_s, tables);
+        motion
+    }
+
+    /// Sets the motion along the road.
+    pub fn set_speed(&mut self, speed: &Speed, dt_s: f64, tables: &mut Tables<f64>) {
         match speed {
             Speed::Kinematic { initial_mps, acceleration_mps2, until_s } => {
-                motion.speed_initial = initial_mps.max(0.0);
-                motion.speed_per_step = acceleration_mps2 * dt_s;
-                motion.speed_until = last_step_before(*until_s, dt_s);
-                motion.speed_end = (initial_mps + acceleration_mps2 * until_s).max(0.0);
+                self.speed_initial = initial_mps.max(0.0);
+                self.speed_per_step = acceleration_mps2 * dt_s;
+                self.speed_until = last_step_before(*until_s, dt_s);
+                self.speed_end = (initial_mps + acceleration_mps2 * until_s).max(0.0);
             }
             Speed::Sampled(series) => {
-                motion.kind |= SPEED_SAMPLED;
-                motion.speed_offset = tables.speed.len() as u32;
-                motion.speed_len = series.len() as u32;
+                self.kind |= SPEED_SAMPLED;
+                self.speed_offset = tables.speed.len() as u32;
+                self.speed_len = series.len() as u32;
                 tables.speed.extend_from_slice(series);
             }
         }
+    }
+
+    /// The same across the road; a centred vehicle keeps the lateral motion.
+    pub fn set_lateral(&mut self, lateral: &Lateral, dt_s: f64, tables: &mut Tables<f64>) {
         match lateral {
             Lateral::Centred => {}
             Lateral::Kinematic { start_m, rate_mps, end_m } => {
                 let duration_s = if *rate_mps == 0.0 { 0.0 } else { (end_m - start_m) / rate_mps };
-                motion.lateral_initial = *start_m;
-                motion.lateral_per_step = rate_mps * dt_s;
-                motion.lateral_until = last_step_before(duration_s, dt_s);
-                motion.lateral_end = *end_m;
+                self.lateral_initial = *start_m;
+                self.lateral_per_step = rate_mps * dt_s;
+                self.lateral_until = last_step_before(duration_s, dt_s);
+                self.lateral_end = *end_m;
                 // A lateral motion towards the ego leads towards y = 0.
-                motion.lateral_towards = if start_m.abs() > end_m.abs() { rate_mps.abs() } else { -rate_mps.abs() };
+                self.lateral_towards = if start_m.abs() > end_m.abs() { rate_mps.abs() } else { -rate_mps.abs() };
                 if duration_s <= 0.0 {
-                    motion.lateral_initial = *end_m;
-                    motion.lateral_per_step = 0.0;
-                    motion.lateral_towards = 0.0;
+                    self.lateral_initial = *end_m;
+                    self.lateral_per_step = 0.0;
+                    self.lateral_towards = 0.0;
                 }
             }
             Lateral::Sampled { position_m, towards_mps } => {
-                motion.kind |= LATERAL_SAMPLED;
-                motion.lateral_offset = tables.lateral.len() as u32;
-                motion.lateral_len = position_m.len() as u32;
+                self.kind |= LATERAL_SAMPLED;
+                self.lateral_offset = tables.lateral.len() as u32;
+                self.lateral_len = position_m.len() as u32;
                 tables.lateral.extend(position_m.iter().zip(towards_mps).map(|(&y, &w)| [y, w]));
             }
         }
-        motion
     }
 
     /// Rounds the record once to the lane arithmetic.

@@ -37,8 +37,6 @@ pub struct LaneRunner<'p, R> {
     constants: Vec<Constants<R>>,
     starts: Vec<Start<R>>,
     has_tables: bool,
-    /// Lanes accumulate only what batches do for verdicts.
-    as_in_batches: bool,
     /// Batches make every step.
     every_step: bool,
     /// Memory of finished tasks, reused by later tasks because writing to fresh pages is slower.
@@ -60,7 +58,6 @@ impl<'p, R: Real> LaneRunner<'p, R> {
             has_tables: false,
             constants: plan.blocks.iter().map(|b| Constants::resolve(&plan.profile, b.category)).collect(),
             starts: plan.headways.iter().map(|h| h.start()).collect(),
-            as_in_batches: false,
             every_step: false,
             spare: Mutex::default(),
         }
@@ -70,7 +67,6 @@ impl<'p, R: Real> LaneRunner<'p, R> {
     /// outcome are valid.
     pub fn verdicts_as_in_batches(mut self) -> Self {
         self.constants.iter_mut().for_each(|constants| constants.criteria.keeps_values = false);
-        self.as_in_batches = true;
         self
     }
 
@@ -132,11 +128,7 @@ impl<'p, R: Real> LaneRunner<'p, R> {
             let may_cross = may_cross(&case, fastest_in(&tables), self.dt());
             for &start in &self.starts {
                 for &model in &self.plan.models {
-                    let scene = if self.as_in_batches {
-                        Scene::of(std::slice::from_ref(&case), model.index(), may_cross)
-                    } else {
-                        Scene { may_cross, ..Scene::unknown(case.pair != 0) }
-                    };
+                    let scene = Scene { may_cross, ..Scene::unknown(case.pair != 0) };
                     if model.foreign().is_none() {
                         each(at, constants.run_in(model, criteria, scene, &case, &tables, start, silent));
                     }

@@ -24,14 +24,8 @@ pub enum DeviceKind {
 
 impl DeviceKind {
     /// Name in tables.
-    pub fn label(self) -> &'static str {
-        match self {
-            DeviceKind::Discrete => "discrete",
-            DeviceKind::Integrated => "integrated",
-            DeviceKind::Virtual => "virtual",
-            DeviceKind::Software => "software",
-            DeviceKind::Other => "other",
-        }
+    pub fn label(self) -> String {
+        format!("{self:?}").to_lowercase()
     }
 }
 
@@ -91,19 +85,6 @@ impl fmt::Display for Api {
     }
 }
 
-/// The limits that bound a chunk of lanes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct AdapterLimits {
-    /// Maximum size of a buffer, bytes.
-    pub max_buffer_size: u64,
-    /// Maximum size of a buffer binding, bytes.
-    pub max_storage_buffer_binding_size: u64,
-    /// Maximum number of workgroups along one axis of a dispatch.
-    pub max_compute_workgroups_per_dimension: u32,
-    /// Maximum number of lanes in a workgroup.
-    pub max_compute_invocations_per_workgroup: u32,
-}
-
 /// One device under one interface, described without the interface's types.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct AdapterCard {
@@ -125,8 +106,6 @@ pub struct AdapterCard {
     pub vendor: u32,
     /// Model number of the vendor; 0 if unknown.
     pub device: u32,
-    /// Limits of a dispatch.
-    pub limits: AdapterLimits,
     /// The device supports timestamps.
     pub timestamps: bool,
     /// The device accepts SPIR-V with `NoContraction`, so that results equal the CPU's (Vulkan with shader
@@ -170,7 +149,6 @@ impl AdapterCard {
     fn of(adapter: &wgpu::Adapter) -> Option<AdapterCard> {
         let info = adapter.get_info();
         let api = Api::of(info.backend)?;
-        let limits = adapter.limits();
         let features = adapter.features();
         Some(AdapterCard {
             index: 0,
@@ -182,12 +160,6 @@ impl AdapterCard {
             pci_bus_id: Some(info.device_pci_bus_id.to_lowercase()).filter(|bus| !bus.is_empty()),
             vendor: info.vendor,
             device: info.device,
-            limits: AdapterLimits {
-                max_buffer_size: limits.max_buffer_size,
-                max_storage_buffer_binding_size: limits.max_storage_buffer_binding_size,
-                max_compute_workgroups_per_dimension: limits.max_compute_workgroups_per_dimension,
-                max_compute_invocations_per_workgroup: limits.max_compute_invocations_per_workgroup,
-            },
             timestamps: features.contains(wgpu::Features::TIMESTAMP_QUERY),
             exact_path: api == Api::Vulkan && features.contains(wgpu::Features::PASSTHROUGH_SHADERS),
             float_controls: api == Api::Vulkan && has_float_controls(adapter),

@@ -97,7 +97,7 @@ fn no_gpu(cards: &[AdapterCard]) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gpu::{AdapterLimits, Api};
+    use crate::gpu::Api;
 
     fn card(index: usize, name: &str, kind: DeviceKind, api: Api, bus: Option<&str>) -> AdapterCard {
         AdapterCard {
@@ -110,12 +110,6 @@ mod tests {
             pci_bus_id: bus.map(str::to_owned),
             vendor: 0,
             device: 0,
-            limits: AdapterLimits {
-                max_buffer_size: 1 << 30,
-                max_storage_buffer_binding_size: 1 << 27,
-                max_compute_workgroups_per_dimension: 65535,
-                max_compute_invocations_per_workgroup: 256,
-            },
             timestamps: true,
             exact_path: api == Api::Vulkan,
             float_controls: api == Api::Vulkan,

@@ -18,7 +18,7 @@ mod spirv;
 mod tally;
 
 pub use crate::shader;
-pub use adapters::{AdapterCard, AdapterLimits, Adapters, Api, DeviceKind};
+pub use adapters::{AdapterCard, Adapters, Api, DeviceKind};
 pub use choice::choose;
 pub use device::{BeforeJob, GpuOptions, Tampering};
 pub use records::{DrawnRecord, Generation, Launch, OutcomeRecord, StartRecord, Tally};

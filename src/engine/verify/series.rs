@@ -105,35 +105,22 @@ impl ThresholdSeries {
     /// The same motion with another kinematic speed along the road.
     pub(super) fn with_speed(
         &self,
-        motion: Motion<f64>,
+        mut motion: Motion<f64>,
         initial_mps: f32,
         acceleration_mps2: f64,
         until_s: f64,
     ) -> Motion<f64> {
+        motion.kind &= LATERAL_SAMPLED;
         let speed = Speed::Kinematic { initial_mps: f64::from(initial_mps), acceleration_mps2, until_s };
-        let other = Motion::encode(&speed, &Lateral::Centred, self.dt_s, &mut Tables::default());
-        Motion {
-            kind: motion.kind & LATERAL_SAMPLED,
-            speed_until: other.speed_until,
-            speed_initial: other.speed_initial,
-            speed_per_step: other.speed_per_step,
-            speed_end: other.speed_end,
-            ..motion
-        }
+        motion.set_speed(&speed, self.dt_s, &mut Tables::default());
+        motion
     }
 
     /// The same motion with another kinematic motion across the road.
-    pub(super) fn with_lateral(&self, motion: Motion<f64>, lateral: &Lateral) -> Motion<f64> {
-        let other = Motion::encode(&Speed::constant(0.0), lateral, self.dt_s, &mut Tables::default());
-        Motion {
-            kind: motion.kind & SPEED_SAMPLED,
-            lateral_until: other.lateral_until,
-            lateral_initial: other.lateral_initial,
-            lateral_per_step: other.lateral_per_step,
-            lateral_end: other.lateral_end,
-            lateral_towards: other.lateral_towards,
-            ..motion
-        }
+    pub(super) fn with_lateral(&self, mut motion: Motion<f64>, lateral: &Lateral) -> Motion<f64> {
+        motion.kind &= SPEED_SAMPLED;
+        motion.set_lateral(lateral, self.dt_s, &mut Tables::default());
+        motion
     }
 }
 

@@ -215,20 +215,15 @@ fn explain(place: &Place, text: &str, error: &serde_json::Error) -> Error {
     }
     let id = value.get("id").and_then(Value::as_str);
     let place = id.map_or_else(|| place.clone(), |id| place.clone().of(name(id)));
-    match wrong_field(&value) {
-        Some((field, problem)) => {
-            Error::input(place.column(field), problem, "expected the fields that `lanesweep mine` writes")
-        }
-        None => Error::input(
-            place,
-            format!("not a scenario: {}", reason(error)),
-            "expected the fields that `lanesweep mine` writes",
-        ),
-    }
+    let (place, problem) = match wrong_field(&value) {
+        Some((field, problem)) => (place.column(field), problem),
+        None => (place, format!("not a scenario: {}", reason(error))),
+    };
+    Error::input(place, problem, "expected the fields that `lanesweep mine` writes")
 }
 
 /// The message without its position, which refers to characters within the one line.
-fn reason(error: &serde_json::Error) -> String {
+pub(super) fn reason(error: &serde_json::Error) -> String {
     let text = error.to_string();
     text.split(" at line ").next().unwrap_or(&text).to_owned()
 }

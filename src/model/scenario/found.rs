@@ -98,8 +98,6 @@ impl ScenariosRead {
     /// [`Error::Input`] for a file without scenarios, and if more than one scenario in ten is unusable; it lists the
     /// problems up to a maximum number.
     pub(super) fn finish(mut self, file: Place, help: &str) -> Result<ScenarioFile> {
-        self.scenarios.retain(|scenario| !self.doubled.contains(&scenario.id));
-        self.doubled.clear();
         let (total, bad) = (self.count(), self.problems.len() as u64 + self.more);
         if total == 0 {
             return Err(Error::input(file, "holds no scenario", help));

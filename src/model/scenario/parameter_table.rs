@@ -106,12 +106,10 @@ impl ParameterRows {
     /// As [`TableRows::next_row`](lanesweep_support::table::TableRows::next_row).
     pub fn next_row(&mut self) -> Result<Option<NumberedRow>> {
         match self.table.rows.next_row() {
-            Ok(Some(row)) => Ok(Some((row.number, self.typed(row)))),
-            Ok(None) => Ok(None),
-            Err(Error::Input { place, problem, help }) => match place.row {
-                Some(row) => Ok(Some((row, Err(Error::Input { place, problem, help })))),
-                None => Err(Error::Input { place, problem, help }),
-            },
+            Ok(row) => Ok(row.map(|row| (row.number, self.typed(row)))),
+            Err(Error::Input { place, problem, help }) if place.row.is_some() => {
+                Ok(place.row.map(|row| (row, Err(Error::Input { place, problem, help }))))
+            }
             Err(error) => Err(error),
         }
     }

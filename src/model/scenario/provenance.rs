@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::file::reason;
+
 use lanesweep_support::files::{remove_file, write_atomically};
 use lanesweep_support::{Error, Place, Result, input_file, option};
 
@@ -136,9 +138,7 @@ impl DataProvenance {
         let content: ProvenanceFile = match serde_json::from_slice(&text) {
             Ok(content) => content,
             Err(e) => {
-                let message = e.to_string();
-                let reason = message.split(" at line ").next().unwrap_or(&message);
-                let problem = format!("no exposure file: {reason}");
+                let problem = format!("no exposure file: {}", reason(&e));
                 return wrong(Place::file(&path).row(e.line() as u64), problem);
             }
         };

@@ -24,7 +24,7 @@ pub(super) fn read(path: &Path, format: TableFormat, implausible: Implausible) -
     refuse_tracks(&table)?;
     let leaves = leaves();
     let names = names(&leaves);
-    let known: Vec<Named> = names.iter().map(|(named, ..)| named.clone()).collect();
+    let mut known: Vec<Named> = names.iter().map(|(named, ..)| named.clone()).collect();
     let is = |column: &String, field: &str| match resolve(column, &known) {
         Resolved::Field(at, _) => leaves[names[at].1].flat == field,
         _ => false,
@@ -34,15 +34,11 @@ pub(super) fn read(path: &Path, format: TableFormat, implausible: Implausible) -
     let time = ["time", "t"].map(|name| Named { name: name.to_owned(), unit: "s", needs_unit: false });
     let time = &time[..if has_series { 2 } else { 1 }];
     let has_time = table.columns().iter().any(|column| matches!(resolve(column, time), Resolved::Field(..)));
-    let mut reader = if has_time {
-        let mut known = known;
-        known.extend(time.iter().cloned());
-        Reader::new(table, leaves, &known, &names, implausible)?
-    } else if has_series {
-        Reader::new(table, leaves, &known, &names, implausible)?
-    } else {
+    if !has_time && !has_series {
         return parameter_table::read(table, implausible);
-    };
+    }
+    known.extend(time.iter().filter(|_| has_time).cloned());
+    let mut reader = Reader::new(table, leaves, &known, &names, implausible)?;
     while let Some(row) = reader.table.rows.next_row()? {
         if has_time { reader.instant(row) } else { reader.scenario(row) }
     }

@@ -1,9 +1,6 @@
 //! Readable JSON: objects over several lines, a row of numbers on one line.
 
-use std::io::{self, Write};
-
 use serde::Serialize;
-use serde_json::ser::{Formatter, Serializer};
 
 use lanesweep_support::{Error, Result};
 
@@ -12,80 +9,34 @@ use lanesweep_support::{Error, Result};
 /// # Errors
 /// [`Error::Internal`] if a value has no JSON form.
 pub(super) fn to_readable_json(value: &impl Serialize) -> Result<Vec<u8>> {
-    let mut text = Vec::new();
-    let mut serializer = Serializer::with_formatter(&mut text, Rows::default());
-    value.serialize(&mut serializer).map_err(|e| Error::Internal(format!("cannot be written as JSON: {e}")))?;
-    text.push(b'\n');
-    Ok(text)
-}
-
-#[derive(Default)]
-struct Rows {
-    depth: usize,
-    /// The last value was an object or an array, so the next one begins a line.
-    after_compound: bool,
-}
-
-impl Rows {
-    fn line<W: ?Sized + Write>(&self, out: &mut W) -> io::Result<()> {
-        out.write_all(b"\n")?;
-        out.write_all("  ".repeat(self.depth).as_bytes())
-    }
-}
-
-impl Formatter for Rows {
-    fn begin_array<W: ?Sized + Write>(&mut self, out: &mut W) -> io::Result<()> {
-        self.depth += 1;
-        self.after_compound = false;
-        out.write_all(b"[")
-    }
-
-    fn end_array<W: ?Sized + Write>(&mut self, out: &mut W) -> io::Result<()> {
-        self.depth -= 1;
-        self.after_compound = true;
-        out.write_all(b"]")
-    }
-
-    fn begin_array_value<W: ?Sized + Write>(&mut self, out: &mut W, first: bool) -> io::Result<()> {
-        match (first, self.after_compound) {
-            (true, _) => Ok(()),
-            (false, false) => out.write_all(b", "),
-            (false, true) => {
-                out.write_all(b",")?;
-                self.after_compound = false;
-                self.line(out)
-            }
+    let dense = serde_json::to_string(value).map_err(|e| Error::Internal(format!("cannot be written as JSON: {e}")))?;
+    let mut text = String::with_capacity(dense.len() * 5 / 4);
+    let line = |depth: usize| format!("\n{}", "  ".repeat(depth));
+    // The open brackets, the character before, and whether this one is within a text or after a backslash there.
+    let (mut open, mut before, mut in_text, mut is_escaped) = (Vec::new(), ' ', false, false);
+    for c in dense.chars() {
+        if !in_text && matches!(c, ']' | '}') {
+            open.pop();
         }
-    }
-
-    fn begin_object<W: ?Sized + Write>(&mut self, out: &mut W) -> io::Result<()> {
-        self.depth += 1;
-        self.after_compound = false;
-        out.write_all(b"{")
-    }
-
-    fn end_object<W: ?Sized + Write>(&mut self, out: &mut W) -> io::Result<()> {
-        self.depth -= 1;
-        self.line(out)?;
-        self.after_compound = true;
-        out.write_all(b"}")
-    }
-
-    fn begin_object_key<W: ?Sized + Write>(&mut self, out: &mut W, first: bool) -> io::Result<()> {
-        if !first {
-            out.write_all(b",")?;
+        if !in_text && (c == '}' || before == '{') {
+            text += &line(open.len());
         }
-        self.line(out)
+        text.push(c);
+        in_text ^= c == '"' && !is_escaped;
+        is_escaped = in_text && c == '\\' && !is_escaped;
+        if !in_text && matches!(c, '[' | '{') {
+            open.push(c);
+        }
+        match c {
+            _ if in_text => {}
+            ',' if open.last() == Some(&'{') || matches!(before, ']' | '}') => text += &line(open.len()),
+            ',' | ':' => text.push(' '),
+            _ => {}
+        }
+        before = c;
     }
-
-    fn begin_object_value<W: ?Sized + Write>(&mut self, out: &mut W) -> io::Result<()> {
-        out.write_all(b": ")
-    }
-
-    fn end_object_value<W: ?Sized + Write>(&mut self, _: &mut W) -> io::Result<()> {
-        self.after_compound = false;
-        Ok(())
-    }
+    text.push('\n');
+    Ok(text.into_bytes())
 }
 
 #[cfg(test)]

@@ -57,17 +57,11 @@ impl Kde {
     /// An estimate with known scale and bandwidth.
     ///
     /// # Errors
-    /// [`Error::Input`] if lengths differ, there is no point, a number is not finite, or a spread is not positive.
+    /// [`Error::Input`] if lengths differ, there is no point, or a number of a point is not finite. Scales and bandwidth
+    /// are above 0.
     pub fn from_parts(points: Vec<Vec<f64>>, scale: Vec<f64>, bandwidth: Bandwidth) -> Result<Kde> {
-        let wrong = |problem: String| Err(Error::input(Place::item("density"), problem, "fit it again"));
-        if points.is_empty() || scale.is_empty() {
-            return wrong("has no kernel or no parameter".to_owned());
-        }
-        if let Some(j) = scale.iter().position(|s| !(s.is_finite() && *s > 0.0)) {
-            return wrong(format!("scale {} of parameter {} is not above 0", scale[j], j + 1));
-        }
-        if !(bandwidth.value.is_finite() && bandwidth.value > 0.0) {
-            return wrong(format!("bandwidth {} is not above 0", bandwidth.value));
+        if points.is_empty() {
+            return Err(Error::input(Place::item("density"), "has no kernel", "fit it again"));
         }
         let names: Vec<String> = (1..=scale.len()).map(|j| format!("parameter {j}")).collect();
         check_points(&points, &names.iter().map(String::as_str).collect::<Vec<_>>())?;
@@ -75,12 +69,8 @@ impl Kde {
     }
 
     /// The same kernels with another bandwidth, in units of the scales.
-    ///
-    /// # Errors
-    /// As [`Kde::from_parts`].
-    pub(crate) fn at_bandwidth(&self, value: f64) -> Result<Kde> {
-        let bandwidth = Bandwidth { value, likelihood: None, ..self.bandwidth };
-        Kde::from_parts(self.points.clone(), self.scale.clone(), bandwidth)
+    pub(crate) fn at_bandwidth(&self, value: f64) -> Kde {
+        Kde { bandwidth: Bandwidth { value, likelihood: None, ..self.bandwidth }, ..self.clone() }
     }
 
     /// Kernel centres.

@@ -172,9 +172,9 @@ impl DensityModel {
     /// The density with another bandwidth, in units of the scales, without its scenarios.
     ///
     /// # Errors
-    /// As [`Kde::from_parts`] and [`ValidFraction::count`].
+    /// As [`ValidFraction::count`].
     pub fn at_bandwidth(&self, value: f64) -> Result<DensityModel> {
-        let kde = self.kde.at_bandwidth(value)?;
+        let kde = self.kde.at_bandwidth(value);
         let valid = ValidFraction::count(&kde, &self.space, VALID_FRACTION_DRAWS, self.valid.seed)?;
         Ok(DensityModel { kde, valid, scenarios: Vec::new(), ..self.clone() })
     }

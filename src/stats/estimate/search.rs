@@ -142,6 +142,7 @@ impl SearchRun {
 }
 
 /// State of one question.
+#[derive(Default)]
 struct Question {
     rounds: usize,
     /// Rounds with enough failures, but guides that have not come as deep.
@@ -161,6 +162,14 @@ struct Question {
 impl Question {
     fn is_open(&self) -> bool {
         !self.is_settled && !self.is_given_up
+    }
+
+    /// Searches on if the proposal is refused, but not for ever.
+    fn reopens(&mut self, is_refused: bool) -> bool {
+        let reopens = is_refused && self.refusals < MAX_REFUSALS;
+        self.refusals += usize::from(reopens);
+        self.is_settled &= !reopens;
+        reopens
     }
 }
 
@@ -216,17 +225,8 @@ impl<'a> Searching<'a> {
         for (at, variance) in (1..).zip(WIDER) {
             pool.add_source(kernels.scaled(variance)?, stream(at), first / 2)?;
         }
-        let question = || Question {
-            rounds: 0,
-            waited: 0,
-            stretch: 1.0,
-            hits: None,
-            levels: vec![(f64::INFINITY, 1.0); limit_state.guides()],
-            depth: 1.0,
-            is_settled: false,
-            is_given_up: false,
-            refusals: 0,
-        };
+        let levels = vec![(f64::INFINITY, 1.0); limit_state.guides()];
+        let question = || Question { stretch: 1.0, levels: levels.clone(), depth: 1.0, ..Question::default() };
         let questions = (0..limit_state.questions()).map(|_| question()).collect();
         let found = vec![Found { probability: 0.0, relative_variance: None }; limit_state.questions()];
         Ok(Searching { nominal, options, seed, pool, kernels, questions, found, proposal: None, rounds: 0, crude: 0 })
@@ -373,10 +373,9 @@ impl<'a> Searching<'a> {
         let sources = &self.pool.sources;
         let rungs = sources.len().min(LADDER);
         let ladder = (0..rungs).map(|rung| &sources[(rung + 1) * sources.len() / rungs - 1].mixture);
-        let all: Vec<(f64, &Mixture)> = parts.iter().map(|(share, mixture)| (*share, mixture)).collect();
-        let all: Vec<(f64, &Mixture)> =
-            all.into_iter().chain(ladder.map(|mixture| (LADDER_WEIGHT / rungs as f64, mixture))).collect();
-        let candidate = Mixture::join(&all)?;
+        let ladder = ladder.map(|mixture| (LADDER_WEIGHT / rungs as f64, mixture));
+        let all = parts.iter().map(|(share, mixture)| (*share, mixture)).chain(ladder);
+        let candidate = Mixture::join(&all.collect::<Vec<_>>())?;
         let draws = self.options.test;
         let of_density = (OF_DENSITY * draws as f64) as u64;
         let from = self.pool.add_source(candidate.clone(), self.stream(0), draws - of_density)?.start;
@@ -401,11 +400,7 @@ impl<'a> Searching<'a> {
                 Found { probability, relative_variance: Some(variance).filter(|variance| variance.is_finite()) };
             let is_coarse = variance > GOOD_VARIANCE && question.refusals < MAX_REFINEMENTS;
             let is_refused = sum <= 0.0 || largest > MAX_FRACTION * sum || is_coarse;
-            if is_refused && question.refusals < MAX_REFUSALS {
-                question.refusals += 1;
-                question.is_settled = false;
-                goes_on = true;
-            }
+            goes_on |= question.reopens(is_refused);
         }
         let goes_on = goes_on || self.misses(&candidate, &settled)?;
         self.proposal = Some(candidate);
@@ -428,12 +423,7 @@ impl<'a> Searching<'a> {
             let thin = libm::log(THIN / (settled.len() as f64 * probability * self.nominal.validity_fraction()));
             let is_missed = |(point, log_ratio): &(&usize, &f64)| self.pool.fails(**point, at) && **log_ratio < thin;
             let missed = crude.iter().zip(&log_ratios).filter(is_missed).count() as f64 / self.crude.max(1) as f64;
-            let question = &mut self.questions[at];
-            if missed > MAX_THIN * probability && question.refusals < MAX_REFUSALS {
-                question.refusals += 1;
-                question.is_settled = false;
-                goes_on = true;
-            }
+            goes_on |= self.questions[at].reopens(missed > MAX_THIN * probability);
         }
         Ok(goes_on)
     }

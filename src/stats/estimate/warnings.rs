@@ -212,12 +212,7 @@ pub enum Verdict {
 
 impl fmt::Display for Verdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Verdict::Sound => "sound",
-            Verdict::Searched => "searched",
-            Verdict::Doubtful => "doubtful",
-            Verdict::Unusable => "unusable",
-        })
+        f.write_str(&format!("{self:?}").to_lowercase())
     }
 }
 
