@@ -255,7 +255,10 @@ impl Configured {
         executor: &Executor,
         work: impl FnOnce(&Executor) -> Result<T>,
     ) -> Result<T> {
-        self.with_bar(units, what, |bar| work(&executor.clone().with_progress(console::inc(bar))))
+        self.with_bar(units, what, |bar| {
+            let moved = bar.clone();
+            work(&executor.clone().with_progress(move |units| moved.inc(units)))
+        })
     }
 
     /// Refuses flags about lanes together with a plan file, which would ignore them. A file that the environment names is
