@@ -688,7 +688,8 @@ def trace(
         Also write ASAM OpenSCENARIO XML 1.2 with OpenDRIVE roads. Every lane becomes NNN-KEY.xosc and NNN-KEY.xodr in
         this folder; index.csv lists them with their outcomes. The other vehicles follow their own motion, step by step.
     ego : Literal["model", "external"]
-        Driver of the ego in `xosc`.
+        Driver of the ego in `xosc`. model: the ego follows the path that the driver model drove. external: your own
+        controller drives the ego; only its position and speed at the start are written.
     duration : Number, s
         End of the scenario with `ego` external, by default 10 s after the lane's last event and end.
     side : Literal["left", "right"]

@@ -108,8 +108,9 @@ fn parsed<'a>(
             return refused(format!("{function} has no such argument"), "leave it out");
         };
         let flag = arg.get_long().map(|long| format!("--{long}"));
+        let needs_no_value = arg.get_num_args().is_some_and(|number| number.min_values() == 0);
         match (value, flag, arg.get_action().takes_values()) {
-            (Given::Flag(is_present), Some(flag), takes_values) if !takes_values || needs_no_value(arg) => {
+            (Given::Flag(is_present), Some(flag), takes_values) if !takes_values || needs_no_value => {
                 flags.extend(is_present.then(|| flag.into()));
             }
             (Given::Flag(is_present), ..) => {
@@ -127,11 +128,6 @@ fn parsed<'a>(
     }
     flags.extend(positions);
     Ok(configured::command().try_get_matches_from(flags))
-}
-
-/// Whether an argument that takes values has a meaning without one.
-fn needs_no_value(arg: &Arg) -> bool {
-    arg.get_num_args().is_some_and(|number| number.min_values() == 0)
 }
 
 /// An error of the command line in the words of a call; `needing` is the argument that needs the missing one.

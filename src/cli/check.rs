@@ -161,16 +161,15 @@ impl Check {
         ];
         let of_tables = [("rows", self.rows.is_some()), ("nominal", self.nominal)];
         let (flags, problem, help) = match table {
-            Some(path) => (
-                &of_one[..],
-                format!("it needs one case, and {} is judged with all its rows, under one profile", path.display()),
-                format!("choose a row: {}, from 1 after the header", option("row = N")),
-            ),
-            None => (
-                &of_tables[..],
-                "it is of a table of cases, and this is one case".to_owned(),
-                format!("give a table (.csv, .parquet) without {}, or leave it out", option("row")),
-            ),
+            Some(path) => {
+                let problem =
+                    format!("it needs one case, and {} is judged with all its rows, under one profile", path.display());
+                (&of_one[..], problem, format!("choose a row: {}, from 1 after the header", option("row = N")))
+            }
+            None => {
+                let help = format!("give a table (.csv, .parquet) without {}, or leave it out", option("row"));
+                (&of_tables[..], "it is of a table of cases, and this is one case".to_owned(), help)
+            }
         };
         let given = flags.iter().find(|(_, is_given)| *is_given);
         given.map_or(Ok(()), |(flag, _)| Err(Error::usage(Place::option(flag), problem, help)))

@@ -12,11 +12,11 @@ use tracing::Level;
 use super::console;
 use super::help::RUN;
 use super::signals::CANCEL;
-use super::{COMMIT, Cli, Verb};
+use super::{Cli, Verb};
 use crate::settings::{FILE_VARIABLE, Key, KeyFlag, KeyKind, Layers, Origin, Setting, Settings, keys_in_order};
 use lanesweep_engine::{BackendChoice, Executor, OpenBackend};
 use lanesweep_model::profile::Profile;
-use lanesweep_report::host::{Host, SettingRecord};
+use lanesweep_report::host::SettingRecord;
 use lanesweep_support::{Error, Place, Result, option};
 
 /// The configuration of a run, and what every verb needs besides.
@@ -30,7 +30,8 @@ pub(super) struct Configured {
     pub command: String,
     /// What stderr shows.
     pub level: Level,
-    started: Instant,
+    /// Start of the verb.
+    pub started: Instant,
 }
 
 /// Tables and keys that determine a plan's lanes; a plan file already contains them.
@@ -227,11 +228,6 @@ impl Configured {
         self.layers.0.iter().filter(|setting| !(has_plan && is_of_plan(&setting.key.name))).map(record).collect()
     }
 
-    /// The record of the host, at the end of the run.
-    pub(super) fn host(&self, opened: &OpenBackend, rechecked_lanes: u64, has_plan: bool) -> Host {
-        Host::of(COMMIT, opened, rechecked_lanes, self.started, self.record(has_plan))
-    }
-
     /// Does work with a bar.
     ///
     /// # Errors
@@ -259,7 +255,10 @@ impl Configured {
         executor: &Executor,
         work: impl FnOnce(&Executor) -> Result<T>,
     ) -> Result<T> {
-        self.with_bar(units, what, |bar| work(&executor.clone().with_progress(console::inc(bar))))
+        self.with_bar(units, what, |bar| {
+            let moved = bar.clone();
+            work(&executor.clone().with_progress(move |units| moved.inc(units)))
+        })
     }
 
     /// Refuses flags about lanes together with a plan file, which would ignore them. A file that the environment names is

@@ -146,12 +146,6 @@ pub(super) fn command_line(words: &[OsString]) -> String {
     format!("lanesweep {}", words.collect::<Vec<_>>().join(" "))
 }
 
-/// Returns a callback that advances a bar.
-pub(super) fn inc(bar: &ProgressBar) -> impl Fn(u64) + Send + Sync + 'static {
-    let bar = bar.clone();
-    move |units| bar.inc(units)
-}
-
 /// A progress bar on stderr, or a line now and then if stderr is no terminal. Its remaining time follows from the units per time.
 pub(super) fn progress(level: Level, units: u64, what: &str) -> ProgressBar {
     let bar = ProgressBar::new(units);
@@ -172,9 +166,8 @@ pub(super) fn progress(level: Level, units: u64, what: &str) -> ProgressBar {
         captured.bar = Some(bar.clone());
     } else if level != Level::ERROR && !is_terminal {
         let weak = bar.downgrade();
-        let tell = move || tell_at_intervals(&weak, BETWEEN_LINES, |line| tracing::info!("{line}"));
         // A system without another thread hears nothing on the way.
-        let _ = std::thread::Builder::new().spawn(tell);
+        let _ = std::thread::Builder::new().spawn(move || log_at_intervals(&weak));
     }
     bar
 }
@@ -182,16 +175,16 @@ pub(super) fn progress(level: Level, units: u64, what: &str) -> ProgressBar {
 /// Time between two lines about a run whose stderr is no terminal.
 const BETWEEN_LINES: Duration = Duration::from_secs(60);
 
-/// Tells the state of a bar at intervals until it is finished or dropped.
-fn tell_at_intervals(bar: &WeakProgressBar, interval: Duration, tell: impl Fn(String)) {
-    let mut due = Instant::now() + interval;
+/// Logs the state of a bar at intervals until it is finished or dropped.
+fn log_at_intervals(bar: &WeakProgressBar) {
+    let mut due = Instant::now() + BETWEEN_LINES;
     loop {
         // Short naps: the thread ends soon after its bar.
-        std::thread::sleep(interval.min(Duration::from_secs(1)));
+        std::thread::sleep(Duration::from_secs(1));
         let Some(bar) = bar.upgrade().filter(|bar| !bar.is_finished()) else { return };
         if Instant::now() >= due {
-            due += interval;
-            tell(line_of(&bar));
+            due += BETWEEN_LINES;
+            tracing::info!("{}", line_of(&bar));
         }
     }
 }

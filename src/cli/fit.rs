@@ -11,7 +11,7 @@ use super::lists;
 use super::source::SourceFlags;
 use super::{Exit, Output};
 use lanesweep_model::scenario::DataProvenance;
-use lanesweep_model::scenario::parameterization::Parameterization;
+use lanesweep_model::scenario::parameterization::{Parameterization, ParameterizationOptions};
 use lanesweep_report::density;
 use lanesweep_report::host::SettingRecord;
 use lanesweep_report::records;
@@ -63,7 +63,10 @@ impl Fit {
         let ids = self.parameterizations.list(&self.categories.list()?)?;
         let typed = self.exposure.driven()?;
         let options = FitOptions {
-            parameterization: config.of_densities(),
+            parameterization: ParameterizationOptions {
+                svd_lateral: config.fit.svd_lateral,
+                ..config.parameterization.clone()
+            },
             with_thw: self.with_thw,
             rule: config.fit.bandwidth_rule,
             valid_draws: config.fit.valid_draws,

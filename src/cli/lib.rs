@@ -138,7 +138,8 @@ pub fn main() -> ExitCode {
 /// starts the global thread pool.
 pub fn main_with(words: &[OsString]) -> Exit {
     write_options_as(Notation::Flag);
-    let matches = match configured::command().try_get_matches_from(with_program_name(words)) {
+    let all = std::iter::once(OsString::from("lanesweep")).chain(words.iter().cloned());
+    let matches = match configured::command().try_get_matches_from(all) {
         Ok(matches) => matches,
         Err(error) => return run_and_report(|| console::refuse(&error)),
     };
@@ -152,10 +153,6 @@ pub fn main_with(words: &[OsString]) -> Exit {
         pool_of(requested)?.build_global().map_err(|error| not_started(requested, &error))?;
         cli.verb.run(&configured).map(|output| output.exit)
     })
-}
-
-fn with_program_name(words: &[OsString]) -> impl Iterator<Item = OsString> + '_ {
-    std::iter::once(OsString::from("lanesweep")).chain(words.iter().cloned())
 }
 
 /// Runs the work and reports the result.

@@ -6,8 +6,9 @@ use super::configured::Configured;
 use super::sample::Sample;
 use super::sample_options::{guard, only_crude};
 use super::signals::CANCEL;
-use super::{Exit, Output};
+use super::{COMMIT, Exit, Output};
 use lanesweep_engine::{Chunk, CpuBackend, Executor, LanePlan, OpenBackend};
+use lanesweep_report::host::Host;
 use lanesweep_report::lanes;
 use lanesweep_run::parts::{EachChunk, Job, PLAN_FILE};
 use lanesweep_run::sampling::{self, FailingLane, SampleKind, SampleOptions, SampleResult};
@@ -71,7 +72,7 @@ impl Sample {
             return Err(Error::usage(Place::option("density"), "there is none", help));
         };
         let density = read_density(density)?;
-        match self.shards.plan_only || self.shards.is_part() {
+        match self.shards.plan_only || self.shards.shard.is_some() {
             true => check_folder(&self.out)?,
             false => drop(RunFolder::open(&self.out, sampling::ESTIMATE_RECORD)?),
         }
@@ -94,7 +95,7 @@ impl Sample {
     /// Executes a plan, whole or a shard of it.
     fn run_sample(&self, sample: sampling::Sample, opened: &OpenBackend, configured: &Configured) -> Result<Output> {
         let executor = &opened.executor().with_recheck(sample.options.seed);
-        let is_split = self.shards.plan_only || self.shards.is_part();
+        let is_split = self.shards.plan_only || self.shards.shard.is_some();
         let sample = match sample.kind {
             SampleKind::Search(search) => {
                 let units = warn_of_long(&sample, &search);
@@ -138,7 +139,7 @@ impl Sample {
         let each = write_chunk.as_mut().map(|write| write as &mut EachChunk);
         configured.with_progress(missing, "sampling", executor, |executor| run.compute(executor, each))?;
         let rows = table.map(TableWriter::stage).transpose()?;
-        if self.shards.is_part() {
+        if self.shards.shard.is_some() {
             rows.map_or(Ok(()), StagedFile::publish)?;
             run.write_part()?;
             return Ok(Exit::Ok.into());
@@ -163,7 +164,8 @@ impl Sample {
             }
         }
         let failures = failures.map(|table| list_failures(table, &sample, &result, configured)).transpose()?;
-        let host = configured.host(opened, result.rechecked_lanes, self.shards.plan.is_some());
+        let settings = configured.record(self.shards.plan.is_some());
+        let host = Host::of(COMMIT, opened, result.rechecked_lanes, configured.started, settings);
         let mut results = run.results()?;
         rows.into_iter().chain(failures).for_each(|table| results.join(table));
         let output = self.format.sample(&sample, &result, host, results)?;

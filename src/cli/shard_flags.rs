@@ -21,10 +21,3 @@ pub(super) struct ShardFlags {
     #[arg(long, conflicts_with = "shard", help_heading = "Run")]
     pub plan_only: bool,
 }
-
-impl ShardFlags {
-    /// Whether this is a part of a run, to be merged with others.
-    pub(super) fn is_part(&self) -> bool {
-        self.shard.is_some()
-    }
-}

@@ -54,7 +54,7 @@ fn receive() -> std::io::Result<()> {
                 say("ending after the present chunk; again to end at once");
                 give_up_after(LONGEST_WAIT);
             } else {
-                end_at_once(signal);
+                end_with(128 + signal);
             }
         }
     };
@@ -88,11 +88,6 @@ fn say(line: &str) {
     use std::io::Write;
     // Ignore a closed stderr: no message can be shown.
     let _ = writeln!(std::io::stderr(), "{line}");
-}
-
-#[cfg(unix)]
-fn end_at_once(signal: i32) -> ! {
-    end_with(128 + signal)
 }
 
 #[cfg(unix)]

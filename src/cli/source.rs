@@ -101,7 +101,7 @@ pub(super) struct SourceFlags {
     #[arg(long, requires = "scenarios", help_heading = "Data")]
     filter: bool,
     #[command(flatten)]
-    plausibility: PlausibilityFlag,
+    pub plausibility: PlausibilityFlag,
 }
 
 impl SourceFlags {
@@ -112,11 +112,6 @@ impl SourceFlags {
             (None, Some(path)) => Source::Scenarios { path: path.clone(), filter: self.filter },
             (None, None) => Source::Generated(configured.settings.generator.clone()),
         }
-    }
-
-    /// The policy for implausible input.
-    pub(super) fn policy(&self) -> Implausible {
-        self.plausibility.policy()
     }
 
     /// Like [`load`].

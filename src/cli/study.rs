@@ -84,7 +84,7 @@ pub(super) struct Study {
 impl Study {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         self.guard_inputs(configured)?;
-        match self.shards.plan_only || self.shards.is_part() {
+        match self.shards.plan_only || self.shards.shard.is_some() {
             true => check_folder(&self.out)?,
             false => drop(RunFolder::open(&self.out, study::STUDY_RECORD)?),
         }
@@ -135,7 +135,7 @@ impl Study {
                 path,
                 &collection.scenarios,
                 &options.categories,
-                self.data.policy(),
+                self.data.plausibility.policy(),
             )?);
         }
         let data = source.describe(collection.synthetic);
@@ -160,7 +160,7 @@ impl Study {
     ) -> Result<Output> {
         let (plan, backend, started) = (study.plan(), opened.backend(), Instant::now());
         let executor = opened.executor().with_recheck(study.facts().score.seed);
-        if self.shards.is_part() {
+        if self.shards.shard.is_some() {
             study.write_plan(&self.out)?;
         }
         // Open before the work, so that an unwritable folder is reported at once.
@@ -178,7 +178,7 @@ impl Study {
             let each = write.as_mut().map(|write| write as &mut EachChunk);
             configured.with_progress(missing, "sweeping", &executor, |executor| run.compute(executor, each))
         })?;
-        if self.shards.is_part() {
+        if self.shards.shard.is_some() {
             run.write_part()?;
             return Ok(Exit::Ok.into());
         }
@@ -222,7 +222,7 @@ impl Study {
 
     /// Checks that every flag has an effect, and that the lane table replaces no other result.
     fn guard_inputs(&self, configured: &Configured) -> Result<()> {
-        if configured.settings.study.compare_reference && (self.shards.is_part() || self.shards.plan_only) {
+        if configured.settings.study.compare_reference && (self.shards.shard.is_some() || self.shards.plan_only) {
             let problem = "a part of a run cannot compare the arithmetics of the whole run";
             return Err(Error::usage(Place::item("study.compare_reference"), problem, "leave it out"));
         }

@@ -16,7 +16,7 @@ use lanesweep_support::{Error, Place, Result};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use crate::grid::{MapParameter, PARAMETERS, Point, without_reaction};
+use crate::grid::{MapParameter, PARAMETERS, Point, is_size, without_reaction};
 use crate::sampling::recipe_without_parameters;
 
 /// A slider: a parameter of maps and its range, in its unit.
@@ -94,12 +94,6 @@ fn described(parameter: &MapParameter) -> Value {
         "suffix": if needs_unit { parameter.unit } else { "" },
         "sign": if parameter.quantity == CaseQuantity::Deceleration { -1 } else { 1 },
     })
-}
-
-/// Whether a quantity is a size, which all cases of a page share.
-fn is_size(quantity: CaseQuantity) -> bool {
-    use CaseQuantity::{EgoLength, EgoWidth, LaneWidth, LateralDistance, Length, Width};
-    [Length, Width, EgoLength, EgoWidth, LaneWidth, LateralDistance].contains(&quantity)
 }
 
 fn flag(parameter: &MapParameter) -> String {

@@ -46,13 +46,6 @@ pub(crate) struct Settings {
     pub verify: VerifySettings,
 }
 
-impl Settings {
-    /// Options of the parameterizations of densities, and of the replays compared with them.
-    pub(crate) fn of_densities(&self) -> ParameterizationOptions {
-        ParameterizationOptions { svd_lateral: self.fit.svd_lateral, ..self.parameterization.clone() }
-    }
-}
-
 settings! {
     /// Options of every verb.
     #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

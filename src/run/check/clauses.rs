@@ -335,12 +335,10 @@ fn competent_driver(profile: &Profile, category: Category, trace: &Trace) -> Vec
     let (quantity, value, threshold) = danger;
     // Profiles without the headway test a TTC instead.
     if threshold > 0.0 {
-        let then = match category {
-            Category::CutIn => "braking begins after the delay; else once it holds",
-            _ if constants.cut_out_headway_tolerance_m > 0.0 => {
-                "braking begins after the delay; else once it holds (the threshold has the profile's tolerance, ours)"
-            }
-            _ => "braking begins after the delay; else once it holds",
+        let then = if category != Category::CutIn && constants.cut_out_headway_tolerance_m > 0.0 {
+            "braking begins after the delay; else once it holds (the threshold has the profile's tolerance, ours)"
+        } else {
+            "braking begins after the delay; else once it holds"
         };
         let at = (seen.map(|step| step.time_s), value);
         list.push(clause.reading((quantity, "s"), at, (Relation::AtMost, threshold), then));

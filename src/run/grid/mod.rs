@@ -21,8 +21,8 @@ use jrc_case::Front;
 pub use map::{CellOutcome, GridMap, boundary, runs};
 pub use parameter::{MapParameter, PARAMETERS, Point};
 pub use plan::{GridPart, GridPlan};
-pub(crate) use robustness::without_reaction;
 pub use robustness::{Perturbation, VARIED};
+pub(crate) use robustness::{is_size, without_reaction};
 pub use run::{Map, MapGrids, MapOptions, MapResult, MappedGrid};
 
 pub use lanesweep_model::scenario::CaseQuantity;

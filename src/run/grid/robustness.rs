@@ -43,9 +43,7 @@ impl Perturbation {
 
     /// Whether it changes a size or a place across the road, which the JRC's cases fix.
     pub(super) fn is_of_geometry(self) -> bool {
-        use CaseQuantity::{EgoLength, EgoWidth, LaneWidth, LateralDistance, Length, Width};
-        let fixed = [LateralDistance, Length, Width, EgoLength, EgoWidth, LaneWidth];
-        self.change.is_some_and(|(quantity, _)| fixed.contains(&quantity))
+        self.change.is_some_and(|(quantity, _)| is_size(quantity))
     }
 
     /// Change of the initial gap, m.
@@ -109,6 +107,12 @@ impl Perturbation {
             _ => point,
         }
     }
+}
+
+/// Whether a quantity is a size or a place across the road.
+pub(crate) fn is_size(quantity: CaseQuantity) -> bool {
+    use CaseQuantity::{EgoLength, EgoWidth, LaneWidth, LateralDistance, Length, Width};
+    [Length, Width, EgoLength, EgoWidth, LaneWidth, LateralDistance].contains(&quantity)
 }
 
 /// The profile under which Reg157 never reacts: the ego keeps its speed. A collision there is a conflict.

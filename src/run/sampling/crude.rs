@@ -114,7 +114,12 @@ pub(super) fn sample_into(
                 let found = ledger.counts(before..at)?.and_then(SampleCounts::crude);
                 tally = found.into_iter().try_fold(tally, SampleTally::merge)?;
                 let rows = crude_rows(plan, &tally, options, exposure, StopReason::Samples);
-                stopped(options, &rows, at, range.end, started)
+                // The widest of the criterion's intervals over all models decides. More samples reduce the uncertainty of the
+                // draws, never that of the data.
+                let judged = rows.iter().filter(|row| row.criterion == options.criterion && row.is_overall(&rows));
+                let widest = judged.max_by(|a, b| a.draws_half_width().total_cmp(&b.draws_half_width()));
+                let rule = StopRule { samples: range.end, ..options.stop };
+                widest.and_then(|row| rule.at(at, row.estimate.failures, row.draws_half_width(), started))
             }
         };
         if let Some(stopped) = reason {
@@ -161,19 +166,4 @@ fn overall(rows: &[EstimateRow]) -> Vec<CheckpointRow> {
         with_data: row.failing_scenarios.map(|n| ([row.estimate.interval.low, row.estimate.interval.high], n)),
     };
     rows.iter().filter(|row| row.is_overall(rows)).map(of).collect()
-}
-
-/// The widest of the criterion's intervals over all models decides.
-fn stopped(
-    options: &SampleOptions,
-    rows: &[EstimateRow],
-    samples: u64,
-    end: u64,
-    started: Instant,
-) -> Option<StopReason> {
-    let judged = rows.iter().filter(|row| row.criterion == options.criterion && row.is_overall(rows));
-    // More samples reduce the uncertainty of the draws, never that of the data.
-    let widest = judged.max_by(|a, b| a.draws_half_width().total_cmp(&b.draws_half_width()))?;
-    let rule = StopRule { samples: end, ..options.stop };
-    rule.at(samples, widest.estimate.failures, widest.draws_half_width(), started)
 }

@@ -66,22 +66,12 @@ impl<'a> LaneLimitState<'a> {
         questions: &[Question],
         executor: Executor<'a>,
     ) -> LaneLimitState<'a> {
-        let mut models: Vec<ModelId> = Vec::new();
-        let mut asked: Vec<usize> = Vec::new();
-        for question in questions {
-            if !models.contains(&question.model) {
-                models.push(question.model);
-            }
-            if !asked.contains(&question.headway) {
-                asked.push(question.headway);
-            }
-        }
-        let lane = |question: &Question| {
-            let model = models.iter().position(|model| *model == question.model).unwrap_or(0);
-            let headway = asked.iter().position(|headway| *headway == question.headway).unwrap_or(0);
-            (headway * models.len() + model, question.criterion)
-        };
-        let questions = questions.iter().map(lane).collect();
+        let (mut models, mut asked) = (Vec::new(), Vec::new());
+        let places: Vec<(usize, usize)> =
+            questions.iter().map(|of| (place(&mut models, of.model), place(&mut asked, of.headway))).collect();
+        let lane =
+            |((model, headway), of): (&(usize, usize), &Question)| (headway * models.len() + model, of.criterion);
+        let questions = places.iter().zip(questions).map(lane).collect();
         let headways = match headways {
             SampleHeadways::Each(list) => SampleHeadways::Each(asked.iter().map(|at| list[*at]).collect()),
             SampleHeadways::Sampled => SampleHeadways::Sampled,
@@ -89,6 +79,14 @@ impl<'a> LaneLimitState<'a> {
         let executor = Executor { recheck: None, ..executor };
         LaneLimitState { density, profile, models, headways, questions, executor }
     }
+}
+
+/// The place of a value in a list, to which it is added if it is new.
+pub(super) fn place<T: PartialEq>(list: &mut Vec<T>, value: T) -> usize {
+    list.iter().position(|known| *known == value).unwrap_or_else(|| {
+        list.push(value);
+        list.len() - 1
+    })
 }
 
 impl LimitState for LaneLimitState<'_> {

@@ -22,7 +22,7 @@ pub const ESTIMATE_RECORD: &str = "estimate.json";
 
 /// Counts of some samples, by the estimator.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(rename_all = "snake_case")]
 pub enum SampleCounts {
     /// Of crude Monte Carlo.
     Crude(SampleTally),

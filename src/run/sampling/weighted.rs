@@ -6,7 +6,7 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use super::estimate_rows::EstimateRow;
-use super::limit_state::{LaneLimitState, scenario_shares, truncated};
+use super::limit_state::{LaneLimitState, place, scenario_shares, truncated};
 use super::result::SampleResult;
 use super::sample_options::Question;
 use super::sample_run::SampleCounts;
@@ -45,10 +45,12 @@ impl Sample {
 
     /// Number of lanes of a sample of importance sampling.
     pub(crate) fn lanes_per_sample(&self) -> u64 {
-        let asked = self.options.asked();
-        let count = |is_first: &dyn Fn(usize) -> bool| (0..asked.len()).filter(|at| is_first(*at)).count() as u64;
-        let models = count(&|at| asked[..at].iter().all(|other| other.model != asked[at].model));
-        models * count(&|at| asked[..at].iter().all(|other| other.headway != asked[at].headway))
+        let (mut models, mut headways) = (Vec::new(), Vec::new());
+        for question in self.options.asked() {
+            place(&mut models, question.model);
+            place(&mut headways, question.headway);
+        }
+        (models.len() * headways.len()) as u64
     }
 
     /// The lanes of all questions as a limit state.
