@@ -101,10 +101,19 @@ impl Source {
     /// # Errors
     /// [`Error::Io`](lanesweep_support::error::Error::Io); as [`DataProvenance::read_beside`].
     pub fn provenance(&self, collection: &Collection) -> Result<DataProvenance> {
+        // That of their file, or of the file that `mine` would write: the same scenarios have the same checksum.
+        let scenarios_sha256 = match self {
+            Source::Scenarios { path, .. } => input_file::sha256(path)?,
+            _ => {
+                let mut hash = Hashing(Sha256::new());
+                write_scenarios_to(&mut hash, &collection.scenarios)?;
+                hex(&hash.0.finalize())
+            }
+        };
         let mut provenance = DataProvenance {
             data: self.describe(collection.synthetic),
             synthetic: collection.synthetic,
-            scenarios_sha256: self.scenarios_sha256(collection)?,
+            scenarios_sha256,
             driven: collection.driven(),
         };
         if let Source::Scenarios { path, .. } = self
@@ -116,20 +125,6 @@ impl Source {
             }
         }
         Ok(provenance)
-    }
-
-    /// SHA-256 of the scenarios loaded from here: that of their file, or of the file that `mine` would write. The same
-    /// scenarios have the same checksum.
-    ///
-    /// # Errors
-    /// [`Error::Io`](lanesweep_support::error::Error::Io).
-    pub(crate) fn scenarios_sha256(&self, collection: &Collection) -> Result<String> {
-        if let Source::Scenarios { path, .. } = self {
-            return input_file::sha256(path);
-        }
-        let mut hash = Hashing(Sha256::new());
-        write_scenarios_to(&mut hash, &collection.scenarios)?;
-        Ok(hex(&hash.0.finalize()))
     }
 }
 

@@ -18,35 +18,22 @@ impl Direction {
 
     /// From `drivingDirection`.
     pub(super) fn from_number(number: i64) -> Option<Self> {
-        match number {
-            1 => Some(Direction::Upper),
-            2 => Some(Direction::Lower),
-            _ => None,
-        }
+        Direction::BOTH.into_iter().find(|direction| *direction as i64 + 1 == number)
     }
 
     /// As `drivingDirection` and as the carriageway's name.
     pub(super) fn name(self) -> &'static str {
-        match self {
-            Direction::Upper => "1",
-            Direction::Lower => "2",
-        }
+        ["1", "2"][self as usize]
     }
 
     /// Column of `recordingMeta` that holds this half's lane lines.
     pub(super) fn markings_column(self) -> &'static str {
-        match self {
-            Direction::Upper => "upperLaneMarkings",
-            Direction::Lower => "lowerLaneMarkings",
-        }
+        ["upperLaneMarkings", "lowerLaneMarkings"][self as usize]
     }
 
     /// +1 where forward is +x.
     fn sign(self) -> f64 {
-        match self {
-            Direction::Upper => -1.0,
-            Direction::Lower => 1.0,
-        }
+        [-1.0, 1.0][self as usize]
     }
 
     /// Forward component of a velocity or acceleration along x.
