@@ -237,6 +237,10 @@ for (const [at, page] of pages.entries()) {
   check(state.known === 'equal', `known lanes: ${state.known}`);
   check(!/differ/.test(state.agreement), `the program's map: ${state.agreement}`);
   console.log(`first picture: ${state.drawn} ms`);
+  const braking = await open(software, page, `#kind=${state.data.category}-braking`);
+  await braking.tab.waitForFunction(() => document.body.dataset.known, { timeout: 300_000 });
+  check(await braking.tab.evaluate(() => document.body.dataset.known) === 'equal', 'known lanes of vehicles that brake');
+  await braking.browser.close();
   if (at === 0) {
     await ofOtherCases(tab);
     await byLink(tab);

@@ -154,15 +154,15 @@ fn generator(
         slots[variable as usize] = at as u32;
         // A speed across the road and a deceleration divide.
         lower[at] = if slider.from > 0.0 { f32::MIN_POSITIVE } else { 0.0 };
-        // An end speed is below the initial speed as a rule.
-        let most = if parameter.quantity == CaseQuantity::EndSpeed { 0.3 } else { 1.0 };
         for (case, point) in points.iter_mut().enumerate() {
-            let share = match case {
-                0 | 1 => case as f64,
-                // Spread evenly: multiples of irrational numbers.
-                _ => most * ((case - 1) as f64 * f64::from(at as u32 * 2 + 3).sqrt()).fract(),
-            };
-            point.push(parameter.si(slider.from + share * (slider.to - slider.from)) as f32);
+            // Spread evenly: multiples of irrational numbers. No square is 3 more than a multiple of 4.
+            let share =
+                if case < 2 { case as f64 } else { ((case - 1) as f64 * f64::from(at as u32 * 4 + 3).sqrt()).fract() };
+            point.push(match parameter.quantity {
+                // Below the speed at which the vehicle begins, which comes second.
+                CaseQuantity::EndSpeed if case > 1 => share as f32 * point[1],
+                _ => parameter.si(slider.from + share * (slider.to - slider.from)) as f32,
+            });
         }
     }
     let dimensions = points[0].len();
