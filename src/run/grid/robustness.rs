@@ -3,7 +3,7 @@
 
 use super::parameter::Point;
 use lanesweep_model::profile::{MAX_STEPS, Profile};
-use lanesweep_model::scenario::{CaseQuantity, Category, MeasurementError, NUMBERS};
+use lanesweep_model::scenario::{CaseQuantity, Category, NUMBERS};
 use lanesweep_support::Result;
 
 /// The changes in words; a case has those of its inputs.
@@ -16,10 +16,8 @@ pub enum Perturbation {
     /// A tenth of the time step, in binary64: shows the effect of steps and rounding. Half a step would keep half of
     /// the step error, and round a delay as the whole step does.
     FinerStep,
-    /// More of an input.
-    More(CaseQuantity, &'static MeasurementError),
-    /// Less of it.
-    Less(CaseQuantity, &'static MeasurementError),
+    /// An input changes by so much, SI units; described in words.
+    Change(CaseQuantity, f64, &'static str),
 }
 
 impl Perturbation {
@@ -30,8 +28,8 @@ impl Perturbation {
         let ordered = ordered.chain(NUMBERS.iter().filter(|number| number.quantity != CaseQuantity::Gap));
         let varied = ordered.filter(|number| number.categories.contains(&category));
         let both = varied.filter_map(|number| {
-            let error = number.error?;
-            Some([Perturbation::More(number.quantity, error), Perturbation::Less(number.quantity, error)])
+            let (si, [more, less]) = number.error?;
+            Some([(si, more), (-si, less)].map(|(by, words)| Perturbation::Change(number.quantity, by, words)))
         });
         std::iter::once(Perturbation::FinerStep).chain(both.flatten()).collect()
     }
@@ -40,8 +38,7 @@ impl Perturbation {
     pub fn label(self) -> &'static str {
         match self {
             Perturbation::FinerStep => "a tenth of the time step",
-            Perturbation::More(_, error) => error.more,
-            Perturbation::Less(_, error) => error.less,
+            Perturbation::Change(.., words) => words,
         }
     }
 
@@ -49,8 +46,7 @@ impl Perturbation {
     fn change(self) -> Option<(CaseQuantity, f64)> {
         match self {
             Perturbation::FinerStep => None,
-            Perturbation::More(quantity, error) => Some((quantity, error.si)),
-            Perturbation::Less(quantity, error) => Some((quantity, -error.si)),
+            Perturbation::Change(quantity, by, _) => Some((quantity, by)),
         }
     }
 
