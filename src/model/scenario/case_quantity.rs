@@ -46,17 +46,6 @@ pub enum CaseQuantity {
     Duration,
 }
 
-/// A usual measurement error of a quantity.
-#[derive(Debug, PartialEq)]
-pub struct MeasurementError {
-    /// SI units.
-    pub si: f64,
-    /// One error more, in words.
-    pub more: &'static str,
-    /// One error less.
-    pub less: &'static str,
-}
-
 /// A quantity of a case: its names, its ranges, what it is measured in, and its field.
 pub struct CaseNumber {
     /// The quantity.
@@ -75,8 +64,8 @@ pub struct CaseNumber {
     pub axis_range: (f64, f64),
     /// Categories that have it.
     pub categories: &'static [Category],
-    /// How accurately it is measured; `None` for what is not varied.
-    pub error: Option<&'static MeasurementError>,
+    /// A usual measurement error, SI units, with one more and one less in words; `None` for what is not varied.
+    pub error: Option<(f64, [&'static str; 2])>,
 }
 
 /// Kilometres per hour in one metre per second.
@@ -97,7 +86,7 @@ macro_rules! error {
         None
     };
     ($words:literal, $si:expr, $text:literal) => {
-        Some(&MeasurementError { si: $si, more: concat!($words, " + ", $text), less: concat!($words, " - ", $text) })
+        Some(($si, [concat!($words, " + ", $text), concat!($words, " - ", $text)]))
     };
 }
 

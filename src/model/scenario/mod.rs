@@ -24,7 +24,7 @@ pub use crate::category::Category;
 pub use crate::motion::{LATERAL_SAMPLED, Lateral, LateralState, Motion, SPEED_SAMPLED, Speed, Tables};
 pub use case_file::CaseFile;
 pub use case_parameters::{CaseParameters, NamedNumber};
-pub use case_quantity::{CaseNumber, CaseQuantity, GAP_ERROR_M, KMH, MeasurementError, NUMBERS, SPEED_ERROR_MPS};
+pub use case_quantity::{CaseNumber, CaseQuantity, GAP_ERROR_M, KMH, NUMBERS, SPEED_ERROR_MPS};
 pub use check::problem_of;
 pub use columns::HELP as COLUMNS_HELP;
 pub use file::{check_scenario_file, read_scenario_file, read_scenarios, write_scenarios, write_scenarios_to};

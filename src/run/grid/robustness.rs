@@ -3,7 +3,7 @@
 
 use super::parameter::Point;
 use lanesweep_model::profile::{MAX_STEPS, Profile};
-use lanesweep_model::scenario::{CaseNumber, CaseQuantity, Category, MeasurementError, NUMBERS};
+use lanesweep_model::scenario::{CaseNumber, CaseQuantity, Category, NUMBERS};
 use lanesweep_support::Result;
 
 /// The changes in words; a case has those of its inputs.
@@ -30,7 +30,7 @@ impl Perturbation {
         let ordered = ordered.chain(NUMBERS.iter().filter(|number| number.quantity != CaseQuantity::Gap));
         let varied = ordered.filter(|number| number.categories.contains(&category));
         let both = varied.filter_map(|&CaseNumber { quantity, error, .. }| {
-            let &MeasurementError { si, more, less } = error?;
+            let (si, [more, less]) = error?;
             Some([(more, si), (less, -si)].map(|(label, by)| Perturbation { label, change: Some((quantity, by)) }))
         });
         std::iter::once(Perturbation::FINER_STEP).chain(both.flatten()).collect()

@@ -17,22 +17,16 @@ use lanesweep_support::{Error, Place, Result};
 pub(crate) const BLOCK: u64 = 4096;
 
 /// Sums that can be joined: `left` covers the indices just before `right`.
-pub trait Join: Sized {
+pub trait Join: Default {
     /// Both together.
     fn join(left: &Self, right: &Self) -> Self;
 }
 
 /// Sums over any set of indices.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct BlockSums<S> {
     /// First index → level and sums of the node.
     nodes: BTreeMap<u64, (u32, S)>,
-}
-
-impl<S> Default for BlockSums<S> {
-    fn default() -> Self {
-        BlockSums { nodes: BTreeMap::new() }
-    }
 }
 
 impl<S: Join + Clone> BlockSums<S> {
@@ -124,7 +118,7 @@ fn pairwise<S: Join + Clone>(leaves: &[S]) -> S {
 mod tests {
     use super::*;
 
-    #[derive(Debug, Clone, Copy, PartialEq)]
+    #[derive(Debug, Default, Clone, Copy, PartialEq)]
     struct Sum(f64);
 
     impl Join for Sum {

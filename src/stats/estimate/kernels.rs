@@ -70,7 +70,8 @@ pub fn kernel_shares(
     let options = Importance { seed, draws: DRAWS, crude_per_draw: crude.div_ceil(DRAWS).max(1) };
     let purposes = [purpose::SHARES, purpose::BESIDE_SHARES];
     let failing = weighted_failures(nominal, proposal, limit_state, &options, purposes, 0..DRAWS)?;
-    let mut counts = vec![Counts::new(kernels.weights().len()); limit_state.questions()];
+    let none = Counts { sums: vec![[0.0; 2]; kernels.weights().len()], weight: 0.0, weight_squared: 0.0 };
+    let mut counts = vec![none; limit_state.questions()];
     for chunk in failing.chunks(KEPT) {
         let of_part = |part: &[WeightedFailure]| {
             let points: Vec<&[f64]> = part.iter().map(|failing| failing.of.point.as_slice()).collect();
@@ -96,10 +97,6 @@ struct Counts {
 }
 
 impl Counts {
-    fn new(kernels: usize) -> Counts {
-        Counts { sums: vec![[0.0; 2]; kernels], weight: 0.0, weight_squared: 0.0 }
-    }
-
     fn add(&mut self, weight: f64, shares: &[f64]) {
         self.weight += weight;
         self.weight_squared += weight * weight;
