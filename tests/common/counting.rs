@@ -5,23 +5,18 @@ use std::ops::{Add, Mul, Neg, Sub};
 
 use lanesweep::model::scalar::{Flag, Real};
 
-/// Operations of the counting type, by kind.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct OperationCount {
-    /// Additions and subtractions.
     pub additions: u64,
-    /// Multiplications.
     pub multiplications: u64,
     /// Correctly rounded divisions.
     pub divisions: u64,
-    /// Comparisons.
     pub comparisons: u64,
     /// Comparisons of a number that is infinite or none.
     pub unbounded: u64,
 }
 
 impl OperationCount {
-    /// All of them.
     pub fn total(&self) -> u64 {
         self.additions + self.multiplications + self.divisions + self.comparisons
     }
@@ -31,7 +26,6 @@ thread_local! {
     static COUNT: Cell<OperationCount> = const { Cell::new(OperationCount { additions: 0, multiplications: 0, divisions: 0, comparisons: 0, unbounded: 0 }) };
 }
 
-/// Adds one to a counter.
 fn count(counter: impl FnOnce(&mut OperationCount) -> &mut u64) {
     COUNT.with(|cell| {
         let mut now = cell.get();

@@ -20,13 +20,11 @@ pub fn software_device() -> Option<(Adapters, usize)> {
     None
 }
 
-/// The software device, open.
 #[cfg(feature = "gpu")]
 pub fn open(options: GpuOptions) -> Option<GpuBackend> {
     tampered(options, Tampering::default())
 }
 
-/// The same with a disturbance.
 #[cfg(feature = "gpu")]
 pub fn tampered(options: GpuOptions, tampering: Tampering) -> Option<GpuBackend> {
     let (adapters, index) = software_device()?;
@@ -60,7 +58,6 @@ pub fn out_of_memory_at(at_job: u64) -> Tampering {
     Tampering { before_job: Some(std::sync::Arc::new(before_job)), ..Default::default() }
 }
 
-/// The software device as a backend.
 #[cfg(feature = "gpu")]
 pub fn software_backend() -> Option<Box<dyn Backend>> {
     Some(Box::new(open(GpuOptions::default())?))
@@ -73,7 +70,6 @@ pub fn software_device() -> Option<((), usize)> {
     None
 }
 
-/// None.
 #[cfg(not(feature = "gpu"))]
 pub fn software_backend() -> Option<Box<dyn Backend>> {
     software_device();

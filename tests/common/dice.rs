@@ -2,7 +2,6 @@
 
 use super::plans::mixed;
 
-/// SplitMix64: a reproducible stream of numbers.
 pub struct Dice(pub u64);
 
 impl Dice {
@@ -25,7 +24,6 @@ impl Dice {
         all[self.below(all.len())].clone()
     }
 
-    /// From `min` to `max` values.
     pub fn list<T>(&mut self, [min, max]: [usize; 2], value: impl Fn(&mut Dice) -> T) -> Vec<T> {
         (0..min + self.below(max + 1 - min)).map(|_| value(self)).collect()
     }

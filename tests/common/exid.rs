@@ -119,7 +119,6 @@ impl Plain {
         Plain::on_bend(recording, stride, f64::INFINITY)
     }
 
-    /// The same on a bend.
     pub fn on_bend(recording: &Recording, stride: usize, radius_m: f64) -> Plain {
         let names = ["track_id", "t", "x", "y", "heading", "speed", "vx", "vy", "length", "width", "class"];
         let mut rows = Vec::new();
@@ -138,29 +137,24 @@ impl Plain {
         Plain { header: names.map(str::to_owned).to_vec(), rows }
     }
 
-    /// A table as a file has it.
     pub fn of_text(text: &str) -> Plain {
         let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
         Plain { header: lines.next().unwrap(), rows: lines.collect() }
     }
 
-    /// The number in a row's column.
     pub fn number(&self, row: usize, name: &str) -> f64 {
         self.rows[row][self.at(name)].parse().unwrap()
     }
 
-    /// Adds to the numbers of a column in some rows.
     pub fn shift(&mut self, rows: &[usize], name: &str, by: f64) {
         let at = self.at(name);
         rows.iter().for_each(|row| self.rows[*row][at] = (self.number(*row, name) + by).to_string());
     }
 
-    /// Position of a column.
     pub fn at(&self, name: &str) -> usize {
         self.header.iter().position(|column| column == name).unwrap()
     }
 
-    /// Changes the numbers of a column.
     pub fn map(&mut self, name: &str, change: impl Fn(f64, &[String]) -> f64) {
         let at = self.at(name);
         for row in &mut self.rows {
@@ -169,7 +163,6 @@ impl Plain {
         }
     }
 
-    /// Removes columns.
     pub fn without(mut self, names: &[&str]) -> Plain {
         for name in names {
             let at = self.at(name);

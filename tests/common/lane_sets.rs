@@ -17,31 +17,26 @@ pub fn forms() -> Vec<Profile> {
         for gate in [LateralGate::EgoWidth, LateralGate::Overlap] {
             for (btn_contact, aborts) in [(BtnContact::Any, false), (BtnContact::Gated, true)] {
                 let mut profile = paper.clone();
-                profile.criteria.btn = btn;
-                profile.criteria.gate = gate;
-                profile.criteria.btn_contact = btn_contact;
+                (profile.criteria.btn, profile.criteria.gate, profile.criteria.btn_contact) = (btn, gate, btn_contact);
                 profile.cchdm.abort_on_large_ttc = aborts;
                 profiles.push(profile);
             }
         }
     }
-    let mut ahead_only = paper.clone();
-    ahead_only.frame.cut_out_evaluated = CutOutEvaluated::Ahead;
-    profiles.push(ahead_only);
-    let mut exposed = paper.clone();
-    exposed.frame.cut_out_target = CutOutTarget::Exposed;
-    profiles.push(exposed);
-    let mut demanding = paper.clone();
-    demanding.frame.cut_out_target = CutOutTarget::LargestDemand;
-    profiles.push(demanding);
-    let mut unsettled = paper.clone();
-    unsettled.frame.end_when_settled = !paper.frame.end_when_settled;
-    unsettled.frame.start_shift = !paper.frame.start_shift;
-    unsettled.frame.time_cap_s = 8.0;
-    profiles.push(unsettled);
-    let mut shortest = paper.clone();
-    shortest.frame.time_cap_s = 2.0 * paper.frame.dt_s;
-    profiles.push(shortest);
+    let with = |change: &dyn Fn(&mut Profile)| {
+        let mut profile = paper.clone();
+        change(&mut profile);
+        profile
+    };
+    profiles.push(with(&|of| of.frame.cut_out_evaluated = CutOutEvaluated::Ahead));
+    profiles.push(with(&|of| of.frame.cut_out_target = CutOutTarget::Exposed));
+    profiles.push(with(&|of| of.frame.cut_out_target = CutOutTarget::LargestDemand));
+    profiles.push(with(&|of| {
+        of.frame.end_when_settled = !of.frame.end_when_settled;
+        of.frame.start_shift = !of.frame.start_shift;
+        of.frame.time_cap_s = 8.0;
+    }));
+    profiles.push(with(&|of| of.frame.time_cap_s = 2.0 * of.frame.dt_s));
     // Steps in which vehicles drive past one another, up to the longest: with every gate and rule of its own.
     let mut patient = paper.clone();
     (patient.reg157.reaction_time_s, patient.reg157.margin_s, patient.cchdm.delay_s) = (1.2, 0.5, 1.8);
@@ -86,7 +81,6 @@ pub fn run_lane<R: Real>(
     constants.run(model, case, tables, start, &mut observer)
 }
 
-/// Random lanes of each model and category.
 pub fn random(profile: &Profile, lanes: u64) -> LanePlan {
     random_plan(profile, &SetOptions { size: lanes, ..Default::default() }).unwrap()
 }
@@ -102,12 +96,10 @@ pub fn thresholds(profile: &Profile, units: u64) -> LanePlan {
     threshold_plan(profile, &SetOptions { size: units, ..Default::default() }).unwrap()
 }
 
-/// A study of two synthetic recordings.
 pub fn small_study() -> LanePlan {
     small_study_of(StudyOptions::default())
 }
 
-/// The same with other options.
 pub fn small_study_of(options: StudyOptions) -> LanePlan {
     plan_study(scenarios_of(2), &Profile::load("paper").unwrap(), &options).unwrap()
 }

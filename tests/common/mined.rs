@@ -10,13 +10,11 @@ use lanesweep::traffic::mining::{Collection, MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::Recording;
 use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate};
 
-/// What is mined from the first recordings of the generator.
 pub fn mined(recordings: usize) -> Collection {
     let generator = GeneratorOptions { recordings, ..GeneratorOptions::default() };
     mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap()
 }
 
-/// The scenarios of the first recordings, mined once.
 pub fn scenarios_of(recordings: usize) -> &'static [Scenario] {
     static MINED: Mutex<BTreeMap<usize, &'static [Scenario]>> = Mutex::new(BTreeMap::new());
     MINED.lock().unwrap().entry(recordings).or_insert_with(|| mined(recordings).scenarios.leak())
@@ -27,12 +25,10 @@ pub fn scenarios() -> &'static [Scenario] {
     scenarios_of(24)
 }
 
-/// The kept scenarios of a category.
 pub fn kept(scenarios: &[Scenario], category: Category) -> Vec<&Scenario> {
     scenarios.iter().filter(|s| s.kept && s.category == category).collect()
 }
 
-/// Where they come from.
 pub fn provenance() -> DataProvenance {
     DataProvenance { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None }
 }

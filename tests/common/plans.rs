@@ -27,7 +27,6 @@ pub fn beside(y_m: f64) -> Case {
     Case { category, ego_length_m, ego_width_m, lane_width_m, ego_speed_mps, principal, ahead: None, horizon_s }
 }
 
-/// A block of units, with S and these variants.
 pub fn block(category: Category, units: usize, variants: &[&str]) -> Block {
     let units = (0..units).map(|k| format!("{}_{k}", category.key())).collect();
     let variants = std::iter::once("S").chain(variants.iter().copied()).map(str::to_owned).collect();
@@ -43,7 +42,6 @@ pub fn plan(blocks: &[(Category, usize, &[&str])]) -> LanePlan {
     LanePlan::new(profile, ModelId::ALL.to_vec(), Headway::paper(), blocks, Arc::new(OneCase(case, tables))).unwrap()
 }
 
-/// Verdict bits from what failed.
 pub fn verdicts(failed: &[Criterion]) -> Verdicts {
     Verdicts(failed.iter().map(|c| 1 << c.index()).sum())
 }

@@ -22,14 +22,12 @@ pub fn unbroken(text: &[u8]) -> String {
     flat(&String::from_utf8_lossy(text)).replace("- ", "-").replace("/ ", "/")
 }
 
-/// The program in a folder.
 pub fn command(dir: &Path, args: &[&str]) -> Command {
     let mut command = Command::new(PROGRAM);
     command.env("NO_COLOR", "1").current_dir(dir).args(args);
     command
 }
 
-/// Exit code, stdout and stderr.
 fn read(output: Output) -> (i32, String, String) {
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     (output.status.code().unwrap_or(-1), text(&output.stdout), text(&output.stderr))
@@ -40,7 +38,6 @@ pub fn lanesweep(dir: &Path, args: &[&str]) -> (i32, String, String) {
     read(command(dir, args).output().unwrap())
 }
 
-/// Runs it to a good end; gives its stdout.
 pub fn done(dir: &Path, args: &[&str]) -> String {
     let (code, out, err) = lanesweep(dir, args);
     assert_eq!(code, 0, "{args:?}: {err}");
@@ -59,7 +56,6 @@ pub fn start(dir: &Path, args: &[&str]) -> Child {
     command(dir, args).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
-/// Waits for the end: exit code and stderr.
 pub fn ended(child: Child) -> (i32, String) {
     let (code, _, err) = read(child.wait_with_output().unwrap());
     (code, err)
@@ -73,7 +69,6 @@ pub fn wait_until(what: &str, mut is_so: impl FnMut() -> bool) {
     }
 }
 
-/// Waits for something that a run at work brings about.
 pub fn wait_for_run(run: &mut Child, what: &str, mut is_so: impl FnMut() -> bool) {
     wait_until(what, || {
         assert!(run.try_wait().unwrap().is_none(), "{what}: the run ended before");
@@ -109,15 +104,12 @@ pub fn names(dir: &Path) -> Vec<String> {
         .collect()
 }
 
-/// Names and content of files.
 pub type Files = BTreeMap<String, Vec<u8>>;
 
-/// The files of a folder.
 pub fn files(dir: &Path) -> Files {
     names(dir).into_iter().map(|name| (name.clone(), std::fs::read(dir.join(name)).unwrap())).collect()
 }
 
-/// Copies a folder into another.
 pub fn copy(from: &Path, to: &Path) {
     for (name, content) in files(from) {
         let to = to.join(name);
@@ -128,7 +120,6 @@ pub fn copy(from: &Path, to: &Path) {
 
 const RECORDS: [&str; 3] = ["run.json", "estimate.json", "map.json"];
 
-/// The same with records and pages changed.
 fn settled(files: Files, record: &dyn Fn(&mut serde_json::Value), page: &dyn Fn(&str) -> String) -> Files {
     let settle = |(name, mut content): (String, Vec<u8>)| {
         if RECORDS.contains(&name.as_str()) {
@@ -191,7 +182,6 @@ pub fn same(found: &Files, expected: &Files, what: &str) {
     }
 }
 
-/// The words of a command.
 pub fn words(line: &str) -> Vec<&str> {
     line.split_whitespace().collect()
 }
@@ -201,7 +191,6 @@ pub fn ran(dir: &Path, line: &str) -> String {
     done(dir, &words(line))
 }
 
-/// Runs a command: exit code, and stderr without the drawing.
 pub fn said(dir: &Path, line: &str) -> (i32, String) {
     let (code, _, err) = lanesweep(dir, &words(line));
     (code, unbroken(err.as_bytes()))
@@ -219,7 +208,6 @@ pub fn table(path: &Path) -> Vec<BTreeMap<String, String>> {
     csv::Reader::from_path(path).unwrap().deserialize().map(Result::unwrap).collect()
 }
 
-/// A document that a run left.
 pub fn json(path: &Path) -> serde_json::Value {
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
 }

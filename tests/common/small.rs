@@ -55,7 +55,6 @@ pub fn recording() -> Recording {
     recording
 }
 
-/// The three files of a recording.
 #[derive(Debug, Clone)]
 pub struct Texts {
     pub tracks: String,
@@ -81,7 +80,6 @@ impl Texts {
         }
     }
 
-    /// Reads them as the recording `01`.
     pub fn read(&self) -> Result<Loaded> {
         self.read_checked(Implausible::Accepted)
     }
@@ -109,7 +107,6 @@ pub fn with_field(table: &str, line: usize, column: &str, value: &str) -> String
     table.lines().enumerate().map(edit).collect()
 }
 
-/// The table without one column.
 pub fn without_column(table: &str, column: &str) -> String {
     let at = table.lines().next().unwrap().split(',').position(|name| name == column).expect("a column of the table");
     let short = |text: &str| {

@@ -1,5 +1,4 @@
-//! A device counts its lanes itself: the tallies are those of the host, whatever the density, the headways and the cut into
-//! chunks; and a wrong count is found.
+//! A device counts its lanes itself: the tallies are those of the host, and a wrong count is found.
 
 use crate::common::device::{open, patched};
 use crate::common::mined::density_of;

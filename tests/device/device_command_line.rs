@@ -1,16 +1,17 @@
-//! `verify`, `--backend` and `--device` as their users type them.
+//! `devices`, `verify`, `--backend` and `--device` as their users type them.
 
 use crate::common::device::software_device;
 use crate::common::program::{files, json, ran, said, same, without_host};
+use lanesweep::engine::BackendChoice;
+use lanesweep::engine::gpu::{Adapters, choose};
 
-/// `--device` with the index of the software device.
 fn device() -> Option<String> {
     software_device().map(|(_, index)| index.to_string())
 }
 
 /// Has this machine a GPU of its own? Then the tests of its absence say nothing.
 fn has_gpu() -> bool {
-    lanesweep::engine::gpu::Adapters::enumerate().cards().iter().any(|card| card.is_real())
+    Adapters::enumerate().cards().iter().any(|card| card.is_real())
 }
 
 const SMALL: &str = "--synth-recordings 1 --config generator.duration_s=120";
@@ -47,4 +48,28 @@ fn a_gpu_that_is_not_there_has_its_own_exit_code_and_nothing_is_written() {
     let (problem, help) = text.split_once("help:").unwrap();
     assert!(!problem.contains("--backend") && problem.contains("compares a device with the CPU"), "{text}");
     assert!(help.contains("--device") && help.contains("--backend cpu compares"), "{text}");
+}
+
+#[test]
+fn the_software_device_is_listed_but_taken_only_by_name() {
+    let Some((adapters, index)) = software_device() else { return };
+    let name = &adapters.cards()[index].name;
+    let text = ran(std::path::Path::new("."), "devices");
+    assert!(text.contains(name.split(' ').next().unwrap()) && text.contains("software"), "{text}");
+    assert!(text.lines().all(|line| line.chars().count() <= 120), "{text}");
+    assert!(text.lines().count() == adapters.cards().len() + 1 && text.contains("exact path"), "{text}");
+    let named = choose(adapters.cards(), BackendChoice::Gpu, Some(&name.parse().unwrap()));
+    assert_eq!(named.unwrap(), Some(index));
+    let auto = choose(adapters.cards(), BackendChoice::Auto, None).unwrap();
+    assert!(auto.is_none_or(|auto| adapters.cards()[auto].is_real()));
+    assert_eq!(adapters.take(index).unwrap().get_info().name.trim(), name);
+}
+
+#[test]
+fn a_driver_that_misses_its_runtime_folder_does_not_look_like_a_failure_of_ours() {
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_lanesweep"));
+    command.arg("devices").env_remove("XDG_RUNTIME_DIR").env_remove("DISPLAY").env_remove("NODEVICE_SELECT");
+    let output = command.output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(0) && said.is_empty(), "{said}");
 }

@@ -1,6 +1,4 @@
-//! Every output word of a device equals the CPU's, bit for bit, whatever the profile, the cut into jobs and the
-//! run-time checks; and a wrong shader is found. The software Vulkan stands for a device here; `lanesweep
-//! verify` asks the same of any other.
+//! Every output word of a device (here the software Vulkan) equals the CPU's, bit for bit; and a wrong shader is found.
 
 use crate::common::device::{open, patched, tampered};
 use crate::common::lane_sets::{forms, of_model, random, small_study, small_study_of, thresholds};
@@ -60,22 +58,12 @@ fn every_word_of_small_studies_and_of_every_kind_of_start_equals_the_cpus() {
 
 #[test]
 #[ignore = "minutes on a software device"]
-fn random_lanes_and_lanes_on_thresholds_are_equal_under_every_profile() {
+fn lanes_are_equal_under_every_profile_and_form_of_every_option_and_at_other_time_steps() {
     let Some(gpu) = open(GpuOptions::default()) else { return };
-    for name in Profile::names() {
-        let profile = Profile::load(name).unwrap();
-        assert_equal(name, &compare("random", &random(&profile, 1000), &gpu, |_| ()).unwrap());
-        assert_equal(name, &compare("thresholds", &thresholds(&profile, 3), &gpu, |_| ()).unwrap());
-    }
-}
-
-#[test]
-#[ignore = "minutes on a software device"]
-fn lanes_are_equal_under_every_form_of_every_option_and_at_other_time_steps() {
-    let Some(gpu) = open(GpuOptions::default()) else { return };
-    for profile in &forms() {
-        let what = format!("{:?} {:?}", profile.criteria, profile.frame);
-        for plan in [random(profile, 200), thresholds(profile, 1)] {
+    let shipped = Profile::names().map(|name| (Profile::load(name).unwrap(), 1000, 3));
+    for (profile, lanes, units) in shipped.chain(forms().into_iter().map(|form| (form, 200, 1))) {
+        let what = format!("{} {:?} {:?}", profile.name, profile.criteria, profile.frame);
+        for plan in [random(&profile, lanes), thresholds(&profile, units)] {
             let comparison = compare("form", &plan, &gpu, |_| ());
             assert_equal(&what, &comparison.unwrap_or_else(|error| panic!("{what}: {error}")));
         }
@@ -125,20 +113,17 @@ fn shader_patch(from: &str, to: &str, [random, thresholds]: [LanePlan; 2]) -> Op
     Some(found)
 }
 
+/// One step more delay, one unit in the last place of a constant, and steps that are skipped down to no gap at all.
 #[test]
-fn one_step_more_delay_in_a_shader_is_found_with_its_model() {
-    let right = "DriverState(driver_coasting, driver_delay_steps)";
-    let profile = Profile::load("paper").unwrap();
-    let lanes = [random(&profile, 1000), thresholds(&profile, 8)];
-    let Some(found) = shader_patch(right, &right.replace("_steps", "_steps + 1u"), lanes) else { return };
+fn a_small_defect_of_a_shader_is_found_with_its_model() {
+    let paper = Profile::load("paper").unwrap();
+    let delay = "DriverState(driver_coasting, driver_delay_steps)";
+    let lanes = [random(&paper, 1000), thresholds(&paper, 8)];
+    let Some(found) = shader_patch(delay, &delay.replace("_steps", "_steps + 1u"), lanes) else { return };
     assert!(!found.is_equal() && !found.worst.is_empty());
     assert!(found.tallies.iter().all(|t| (t.words_differing > 0) == (t.model.name() == "CCHDM")), "{found:?}");
     assert!(found.tallies.iter().any(|t| t.verdicts_differing > 0));
-}
-
-#[test]
-fn one_unit_in_the_last_place_of_a_constant_is_found() {
-    let plants = [
+    for (model, from, constant) in [
         // 1/12 in the Reg157 threshold.
         (ModelId::Reg157, "dv * driver_half_inverse_deceleration", "driver_half_inverse_deceleration"),
         (ModelId::Cchdm, "driver_ttc * closes", "driver_ttc"),
@@ -146,13 +131,14 @@ fn one_unit_in_the_last_place_of_a_constant_is_found() {
         (ModelId::Rss, "v_ego * driver_response_time", "driver_response_time"),
         (ModelId::Reg157, "limit = criteria_ttc_threshold", "criteria_ttc_threshold"),
         (ModelId::Rss, "closing * btn_ramp_delay", "btn_ramp_delay"),
-    ];
-    for (model, from, constant) in plants {
-        let lanes = of_model(&Profile::load("paper").unwrap(), model, 4000);
+    ] {
         let to = from.replace(constant, &format!("bitcast<f32>(bitcast<u32>({constant}) + 1u)"));
-        let Some(found) = shader_patch(from, &to, lanes) else { return };
+        let found = shader_patch(from, &to, of_model(&paper, model, 4000)).unwrap();
         assert!(!found.is_equal(), "{to} was not found");
     }
+    let lanes = [random(&paper, 4000), thresholds(&paper, 8)];
+    let found = shader_patch("(next < lowest) | (next <= 0.0)", "(next <= 0.0)", lanes).unwrap();
+    assert!(found.modes_differing + found.tallies.iter().map(|t| t.verdicts_differing).sum::<u64>() > 0, "{found:?}");
 }
 
 /// A wrong value without a verdict is found in its own word, and in no other.
@@ -173,15 +159,6 @@ fn one_wrong_value_without_a_verdict_is_found_under_its_name() {
         assert!(found.worst.len() > 5 && is_named, "{to}: {:?}", found.worst);
         assert!(found.tallies.iter().all(|t| t.words_differing == t.lanes_differing && t.verdicts_differing == 0));
     }
-}
-
-/// Steps that are skipped down to no gap at all: contacts and reactions are missed.
-#[test]
-fn a_jump_that_goes_too_far_is_found() {
-    let profile = Profile::load("paper").unwrap();
-    let lanes = [random(&profile, 4000), thresholds(&profile, 8)];
-    let Some(found) = shader_patch("(next < lowest) | (next <= 0.0)", "(next <= 0.0)", lanes) else { return };
-    assert!(found.modes_differing + found.tallies.iter().map(|t| t.verdicts_differing).sum::<u64>() > 0, "{found:?}");
 }
 
 #[test]

@@ -1,5 +1,4 @@
-//! A device that fails takes nothing with it: the CPU computes what is missing, the user is told, and the
-//! numbers are complete.
+//! A device that fails takes nothing with it; sessions side by side do not disturb one another.
 
 use std::time::Duration;
 
@@ -8,12 +7,17 @@ use lanesweep::Error;
 use lanesweep::engine::gpu::{GpuBackend, GpuOptions};
 use lanesweep::engine::verify::{SetOptions, random_plan};
 use lanesweep::engine::{
-    Backend, CpuBackend, Executor, LanePlan, Partial, RecheckOptions, SweepSummary, Verdicts, Wanted,
+    Backend, CpuBackend, Executor, LanePlan, Partial, RecheckOptions, SweepSummary, Verdicts, Wanted, same_words,
 };
+use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 
 fn plan() -> LanePlan {
-    let options = SetOptions { size: 40_000, ..Default::default() };
+    random(40_000, SetOptions::default().seed, &ModelId::ALL)
+}
+
+fn random(lanes: u64, seed: u64, models: &[ModelId]) -> LanePlan {
+    let options = SetOptions { size: lanes, seed, models: models.to_vec(), ..Default::default() };
     random_plan(&Profile::load("paper").unwrap(), &options).unwrap()
 }
 
@@ -61,6 +65,11 @@ fn a_device_that_is_lost_has_no_memory_or_does_not_answer_in_time_leaves_complet
         // A lost one stays lost, and says so.
         assert!(what != "lost" || matches!(gpu.prepare(&plan).err(), Some(Error::Device { .. })));
     }
+    // Without a stand-in the failure is the user's to know.
+    let gpu = lost(0).unwrap();
+    let error = Executor::new(&gpu).sweep(&plan, 0..plan.unit_count(), Wanted::Verdicts, |_| Ok(())).unwrap_err();
+    assert!(matches!(&error, Error::Device { .. }), "{error}");
+    assert!(error.help().unwrap().contains("option `backend = cpu`"));
 }
 
 #[test]
@@ -97,15 +106,6 @@ fn lanes_of_more_steps_than_a_device_runs_are_computed_all_the_same() {
 }
 
 #[test]
-fn without_a_stand_in_the_failure_is_the_users_to_know() {
-    let plan = plan();
-    let Some(gpu) = tampered(GpuOptions::default(), lost_at(0)) else { return };
-    let error = Executor::new(&gpu).sweep(&plan, 0..plan.unit_count(), Wanted::Verdicts, |_| Ok(())).unwrap_err();
-    assert!(matches!(&error, Error::Device { .. }), "{error}");
-    assert!(error.help().unwrap().contains("option `backend = cpu`"));
-}
-
-#[test]
 fn a_wrong_lane_stops_the_run_and_is_named() {
     let plan = plan();
     // One model's verdict bit, always.
@@ -118,4 +118,50 @@ fn a_wrong_lane_stops_the_run_and_is_named() {
         assert!(matches!(&error, Error::Verification(_)), "{error}");
         assert!(error.to_string().contains("lane random-"), "{error}");
     }
+}
+
+#[test]
+fn sessions_of_one_device_do_not_disturb_one_another() {
+    let Some(gpu) = open(GpuOptions { first_lanes: 200, ..Default::default() }) else { return };
+    let plans = [random(2000, 1, &ModelId::ALL), random(1500, 2, &[ModelId::Rss]), random(900, 3, &ModelId::ALL)];
+    let cpu = CpuBackend::lane_arithmetic();
+    std::thread::scope(|scope| {
+        for plan in &plans {
+            let (gpu, cpu) = (&gpu, &cpu);
+            scope.spawn(move || {
+                let mut ours = cpu.prepare(plan).unwrap();
+                for round in 0..3 {
+                    let mut theirs = gpu.prepare(plan).unwrap();
+                    for wanted in [Wanted::Verdicts, Wanted::Outcomes] {
+                        let from = round % plan.unit_count();
+                        let a = ours.run(from..plan.unit_count(), wanted).unwrap();
+                        let b = theirs.run(from..plan.unit_count(), wanted).unwrap();
+                        assert!(a == b || wanted == Wanted::Outcomes, "{wanted:?}");
+                        assert!(a.outcomes.iter().zip(&b.outcomes).all(|(a, b)| same_words(a, b)));
+                    }
+                }
+            });
+        }
+    });
+    // In turns on one thread.
+    let mut sessions: Vec<_> = plans.iter().map(|p| gpu.prepare(p).unwrap()).collect();
+    for unit in 0..10 {
+        for (plan, session) in plans.iter().zip(&mut sessions) {
+            let a = cpu.prepare(plan).unwrap().run(unit..unit + 3, Wanted::Verdicts).unwrap();
+            assert!(a == session.run(unit..unit + 3, Wanted::Verdicts).unwrap());
+        }
+    }
+}
+
+#[test]
+fn a_device_may_go_before_its_sessions_which_then_hear_of_it() {
+    let Some(gpu) = open(GpuOptions::default()) else { return };
+    let plan = random(400, 5, &[ModelId::Rss]);
+    let (sender, done) = std::sync::mpsc::channel();
+    std::thread::spawn(move || {
+        let mut session = gpu.prepare(&plan).unwrap();
+        drop(gpu);
+        sender.send(session.run(0..1, Wanted::Verdicts).is_err()).unwrap();
+    });
+    assert!(done.recv_timeout(std::time::Duration::from_secs(20)).expect("the drop hangs"));
 }

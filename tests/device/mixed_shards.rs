@@ -1,5 +1,4 @@
-//! Shards that ran on different backends, in any order, join to the run in one piece, byte for byte. Seven shards by
-//! default; the long form is `cargo test --release --test commands mixed_shards:: -- --ignored` (1, 7 and 100 of each run).
+//! Shards that ran on different backends, in any order, join to the run in one piece, byte for byte.
 
 use crate::common::device::software_device;
 use crate::common::program::{files, ran, same, without_host};

@@ -1,20 +1,15 @@
 //! Lanes on a device. Without one the tests say so and pass; `LANESWEEP_REQUIRE_DEVICE=1` makes that a failure.
-//! Programs without the feature `gpu` have only the test that they say so.
 
 #[cfg(feature = "gpu")]
 mod counting;
 #[cfg(feature = "gpu")]
 mod device_command_line;
 #[cfg(feature = "gpu")]
-mod device_edges;
-#[cfg(feature = "gpu")]
 mod device_equals_cpu;
 #[cfg(feature = "gpu")]
 mod device_failures;
 #[cfg(feature = "gpu")]
 mod device_size;
-#[cfg(feature = "gpu")]
-mod devices;
 #[cfg(feature = "gpu")]
 mod exact_division;
 #[cfg(feature = "gpu")]

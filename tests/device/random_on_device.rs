@@ -1,6 +1,4 @@
-//! What `src/random` makes of (seed, index), `shaders/shared/{philox,normal}.wgsl` make bit for bit: on
-//! the software Vulkan, for a million indices in eight dimensions, and for the words at which the table of normal
-//! deviates goes from one cubic to the next.
+//! What `src/random` makes of (seed, index), `shaders/shared/{philox,normal}.wgsl` make bit for bit on the software Vulkan.
 
 use crate::device::kernel::{Kernel, Path, WORKGROUP};
 use lanesweep::engine::gpu::shader::RANDOM;
@@ -31,7 +29,6 @@ fn lanes(@builtin(global_invocation_id) id: vec3<u32>) {
 ";
 const ANSWERS: [&str; 3] = ["Philox word", "normal of it", "choice"];
 
-/// Per word: its normal deviate.
 const OF_WORDS: &str = "
 @compute @workgroup_size(64)
 fn lanes(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -40,7 +37,6 @@ fn lanes(@builtin(global_invocation_id) id: vec3<u32>) {
 ";
 
 const DIMENSIONS: u32 = 8;
-/// Indices of one dispatch.
 const BATCH: u32 = 1 << 16;
 
 fn source(kernel: &str) -> String {
@@ -53,17 +49,14 @@ fn run(kernel: &Kernel, questions: &[u32], workgroups: u32, words: usize) -> Vec
     kernel.run(&[questions, &normal], workgroups, words)
 }
 
-/// What Rust says to an index and a dimension.
 fn expected(stream: Stream, index: u64, dimension: u32) -> [u32; 3] {
     let random = stream.words(index, dimension / 4)[(dimension % 4) as usize];
     [random, standard_normal(random).to_bits(), choose(random, CHOICES + dimension)]
 }
 
-/// Choices in dimension 0.
 const CHOICES: u32 = 3;
 const SEED: u64 = 0xFEDC_BA98_7654_3210;
 
-/// Differing words by kind, with the first of them.
 fn differing(kernel: &Kernel, first_indices: &[u64]) -> ([usize; 3], Option<String>) {
     let stream = Stream { seed: SEED, purpose: 7 };
     let (mut wrong, mut first) = ([0; 3], None);

@@ -1,5 +1,4 @@
-//! The shaders say what the host says: same records, same constants, same parallel trees, and nothing that devices
-//! differ on. The shaders are read with naga, so that no device is needed.
+//! The shaders say what the host says, and nothing that devices differ on; read with naga, so that no device is needed.
 
 use std::collections::BTreeSet;
 use std::mem::offset_of;
@@ -135,8 +134,7 @@ fn every_pipeline_parses_validates_and_becomes_spirv_under_every_profile() {
         for (place, constants) in resolved() {
             for paired in [false, true] {
                 let constants = shader::constants(&constants, model, specialization(paired));
-                let words = exact_spirv(&source, shader::ENTRY, &constants, false);
-                assert!(words.is_ok_and(|words| !words.is_empty()), "{model:?}, {place}, paired {paired}");
+                assert!(becomes_spirv(&source, shader::ENTRY, &constants), "{model:?}, {place}, paired {paired}");
                 compiled += 1;
             }
         }
@@ -145,11 +143,31 @@ fn every_pipeline_parses_validates_and_becomes_spirv_under_every_profile() {
 }
 
 #[test]
-fn every_record_has_the_layout_of_its_rust_twin() {
+fn every_model_has_the_records_the_entry_the_loops_and_the_arithmetic_that_the_host_expects() {
     for model in ModelId::ALL {
-        let (module, _) = parse(&shader::assemble(model));
+        let (module, info) = parse(&shader::assemble(model));
         same_records(&module, records());
+        let [entry] = module.entry_points.as_slice() else { panic!("one entry point") };
+        let expected = (shader::ENTRY, naga::ShaderStage::Compute, [shader::WORKGROUP, 1, 1]);
+        assert_eq!((entry.name.as_str(), entry.stage, entry.workgroup_size), expected);
+        same_constants(&module, &[("WORKGROUP", shader::WORKGROUP), ("MODELS", MODELS as u32)]);
+        // As naga understands the source: no remainder, no root, no built-in function but the magnitude. The device's own
+        // quotient is only a guess, and only exact_div asks for it.
+        operations(&module, &info, &["exact_div"]);
+        // exact_div, btn_solve, carried, the turns and the steps of lanes.
+        assert_eq!(unbounded_loops(&module), (5, vec![]), "{model:?}");
     }
+}
+
+/// Nothing that devices differ on, and divisions only in these functions.
+fn operations(module: &naga::Module, info: &naga::valid::ModuleInfo, divided_in: &[&str]) {
+    let found = float_operations(module, info);
+    assert_eq!(found.forbidden, Vec::<String>::new());
+    assert_eq!(found.divided_in, divided_in);
+}
+
+fn becomes_spirv(source: &str, entry: &str, constants: &[(&str, f64)]) -> bool {
+    exact_spirv(source, entry, constants, false).is_ok_and(|words| !words.is_empty())
 }
 
 fn same_records(module: &naga::Module, records: impl IntoIterator<Item = Record>) {
@@ -191,10 +209,8 @@ fn the_generator_has_the_records_the_numbers_and_the_arithmetic_of_its_rust_twin
         ("NEVER", NEVER),
     ];
     same_constants(&module, &constants);
-    let found = float_operations(&module, &info);
-    assert_eq!((found.forbidden, found.divided_in), (Vec::<String>::new(), vec!["exact_div".to_owned()]));
-    let words = exact_spirv(&shader::assemble_generator(), shader::GENERATE, &generator_constants(), false);
-    assert!(words.is_ok_and(|w| !w.is_empty()));
+    operations(&module, &info, &["exact_div"]);
+    assert!(becomes_spirv(&shader::assemble_generator(), shader::GENERATE, &generator_constants()));
 }
 
 /// The kernels of a map's page, which no device of this program runs: a browser joins their sources.
@@ -209,27 +225,19 @@ fn the_kernels_of_the_page_have_the_records_the_entries_and_the_arithmetic_of_th
         for (source, name, values) in [(&lanes, shader::ENTRY, false), (&traced, "trace", true)] {
             let (module, info) = parse(source);
             same_records(&module, records());
-            let found = float_operations(&module, &info);
-            assert_eq!((found.forbidden, found.divided_in), (vec![], vec!["exact_div".to_owned()]));
+            operations(&module, &info, &["exact_div"]);
             assert_eq!(unbounded_loops(&module).1, Vec::<String>::new(), "{model:?}, {name}");
             let [entry] = module.entry_points.as_slice() else { panic!("one entry point") };
             assert_eq!((entry.name.as_str(), entry.workgroup_size), (name, [shader::WORKGROUP, 1, 1]));
             let constants = shader::constants(&constants, model, Specialization { values, ..specialization(true) });
-            assert!(
-                exact_spirv(source, name, &constants, false).is_ok_and(|words| !words.is_empty()),
-                "{model:?}, {name}"
-            );
+            assert!(becomes_spirv(source, name, &constants), "{model:?}, {name}");
         }
     }
     let source = shader::assemble_generator() + TRAFFIC.1;
     let (module, info) = parse(&source);
-    let found = float_operations(&module, &info);
-    assert_eq!((found.forbidden, found.divided_in), (vec![], vec!["exact_div".to_owned()]));
+    operations(&module, &info, &["exact_div"]);
     for entry in [shader::GENERATE, "mark_traffic"] {
-        assert!(
-            exact_spirv(&source, entry, &generator_constants(), false).is_ok_and(|words| !words.is_empty()),
-            "{entry}"
-        );
+        assert!(becomes_spirv(&source, entry, &generator_constants()), "{entry}");
     }
 }
 
@@ -283,8 +291,7 @@ fn the_counting_has_the_records_and_the_places_of_its_rust_twins() {
         ("WORKGROUP", shader::WORKGROUP),
     ];
     same_constants(&module, &constants);
-    let found = float_operations(&module, &info);
-    assert_eq!((found.forbidden, found.divided_in), (vec![], vec![]));
+    operations(&module, &info, &[]);
     assert_eq!(unbounded_loops(&module), (3, vec![]));
     let [entry] = module.entry_points.as_slice() else { panic!("one entry point") };
     assert_eq!(entry.name, shader::COUNT);
@@ -333,19 +340,6 @@ fn every_override_gets_a_value_of_its_type_and_no_value_is_left_over() {
                 }
             }
         }
-    }
-}
-
-#[test]
-fn the_entry_is_the_one_that_the_host_asks_for() {
-    for model in ModelId::ALL {
-        let (module, _) = parse(&shader::assemble(model));
-        let [entry] = module.entry_points.as_slice() else { panic!("one entry point") };
-        assert_eq!(entry.name, shader::ENTRY);
-        assert_eq!(entry.stage, naga::ShaderStage::Compute);
-        assert_eq!(entry.workgroup_size, [shader::WORKGROUP, 1, 1]);
-        assert_eq!(constant(&module, "WORKGROUP"), shader::WORKGROUP);
-        assert_eq!(constant(&module, "MODELS"), MODELS as u32);
     }
 }
 
@@ -498,11 +492,9 @@ fn the_fragments_of_sampling_do_only_what_devices_agree_on() {
     let tables = "@group(0) @binding(0) var<storage, read> normal_table: array<vec4<f32>>;\n";
     let source = RANDOM.iter().fold(tables.to_owned(), |source, (_, text)| source + text);
     let (module, info) = parse(&source);
-    let found = float_operations(&module, &info);
-    assert_eq!((found.forbidden, found.divided_in), (vec![], vec![]));
-    let (loops, unbounded) = unbounded_loops(&module);
+    operations(&module, &info, &[]);
     // philox4x32_10.
-    assert_eq!((loops, unbounded), (1, vec![]));
+    assert_eq!(unbounded_loops(&module), (1, vec![]));
 }
 
 /// Names and texts of the files that pipelines are made of.
@@ -549,26 +541,7 @@ fn only_the_entry_has_bindings_and_every_file_stays_short_and_plain() {
 }
 
 #[test]
-fn floats_are_added_multiplied_negated_and_compared_and_divided_in_one_place() {
-    for model in ModelId::ALL {
-        let (module, info) = parse(&shader::assemble(model));
-        let found = float_operations(&module, &info);
-        // As naga understands the source: no remainder, no root, no built-in function but the magnitude.
-        assert_eq!(found.forbidden, Vec::<String>::new(), "{model:?}");
-        // The device's own quotient is only a guess, and only exact_div asks for it.
-        assert_eq!(found.divided_in, ["exact_div"], "{model:?}");
-    }
-}
-
-#[test]
-fn every_loop_counts_up_to_a_constant_or_an_override() {
-    for model in ModelId::ALL {
-        let (module, _) = parse(&shader::assemble(model));
-        let (loops, unbounded) = unbounded_loops(&module);
-        assert_eq!(unbounded, Vec::<String>::new(), "{model:?}");
-        // exact_div, btn_solve, carried, the turns and the steps of lanes.
-        assert_eq!(loops, 5, "{model:?}");
-    }
+fn a_loop_that_counts_up_to_no_constant_is_found() {
     for (body, counted) in [
         ("for (var k = 0u; k < 9u; k++) { x = x + 1.0; }", true),
         ("for (var k = 0u; k < n; k++) { x = x + 1.0; }", false),

@@ -75,16 +75,13 @@ pub fn function_names(text: &str) -> Vec<String> {
     names.filter(|name| !name.is_empty()).collect()
 }
 
-/// What the functions of a module do with floats.
 #[derive(Debug, Default)]
 pub struct FloatOperations {
     /// Built-in functions other than the magnitude, remainders, anything else that devices differ on.
     pub forbidden: Vec<String>,
-    /// Function of each division of floats.
     pub divided_in: Vec<String>,
 }
 
-/// Looks at every expression of every function.
 pub fn float_operations(module: &Module, info: &ModuleInfo) -> FloatOperations {
     let mut found = FloatOperations::default();
     let entries = module.entry_points.iter().enumerate().map(|(at, e)| (&e.function, info.get_entry_point(at)));
@@ -156,7 +153,6 @@ pub fn uninitialized_in_loops(text: &str) -> Vec<String> {
     found
 }
 
-/// Calls `look` with every statement, however deep.
 fn walk(block: &Block, look: &mut impl FnMut(&Statement)) {
     for statement in block {
         look(statement);

@@ -1,7 +1,4 @@
-//! Our lanes against the outputs of other people's simulators: the tables of `tests/golden`, row by row.
-//!
-//! The labels of all rows must be equal. On robust rows, whose outcome does not depend on rounding, types and values must
-//! be equal too.
+//! Our lanes against the outputs of other people's simulators, row by row: labels equal in all rows, values in robust ones.
 
 use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
@@ -18,10 +15,8 @@ use lanesweep::scenario::{Case, Category, Tables, read_scenarios};
 use crate::common;
 use crate::common::lane_sets::run_lane;
 
-/// Maximum difference of values on robust rows.
 const TOLERANCE: f64 = 1e-6;
 
-/// One row, with its place for messages.
 struct Row {
     cells: HashMap<String, String>,
     place: String,
@@ -70,7 +65,6 @@ fn rows(path: &Path) -> Vec<Row> {
 /// The outcome of a lane, its steps, and the minima of TTC and gap.
 type Ran = (Outcome<f64>, Vec<Step<f64>>, [f64; 2]);
 
-/// One row of the JRC's case tables as a lane.
 struct Replay {
     model: ModelId,
     profile: Profile,
@@ -228,20 +222,13 @@ fn surrogates_distances_and_thresholds_equal_the_jrc_functions() {
 }
 
 #[test]
-fn every_leader_deceleration_of_the_jrc_ends_as_in_its_simulator() {
-    let rows = rows(&common::golden("lvd.csv"));
-    assert_eq!(rows.len(), 718);
-    let differences = jrc_differences(&rows, true);
-    assert!(differences.is_empty(), "{differences:#?}");
-}
-
-#[test]
-fn every_cut_in_and_cut_out_of_the_jrc_ends_as_in_its_simulator() {
-    for (name, count) in [("golden/jrc/cutin.csv", 2158), ("golden/jrc/cutout.csv", 1726)] {
-        let Some(path) = common::shared(name) else { continue };
+fn every_case_of_the_jrc_ends_as_in_its_simulator() {
+    let shared = |name| common::shared(&format!("golden/jrc/{name}.csv"));
+    let tables = [(Some(common::golden("lvd.csv")), 718), (shared("cutin"), 2158), (shared("cutout"), 1726)];
+    for (path, count) in tables.into_iter().filter_map(|(path, count)| Some((path?, count))) {
         let rows = rows(&path);
         assert_eq!(rows.len(), count);
-        let differences = jrc_differences(&rows, false);
+        let differences = jrc_differences(&rows, count == 718);
         assert!(differences.is_empty(), "{differences:#?}");
     }
 }

@@ -5,9 +5,10 @@ use lanesweep::model::criterion::BtnContact;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::model::scalar::Real;
-use lanesweep::scenario::{Ahead, Case, Category, Lateral, Participant, Speed};
+use lanesweep::scenario::{Case, Speed};
 
 use crate::common::lane_sets::{random, run_case, run_lane};
+use crate::common::plans::beside;
 
 /// A profile whose FSM keeps its speed: its reaction time is longer than any run.
 fn unreacting(time_cap_s: f64) -> Profile {
@@ -16,22 +17,6 @@ fn unreacting(time_cap_s: f64) -> Profile {
     profile.frame.time_cap_s = time_cap_s;
     profile
 }
-
-fn vehicle(speed_mps: f64, lateral: Lateral) -> Participant {
-    Participant { length_m: 4.3, width_m: 1.8, speed: Speed::constant(speed_mps), lateral }
-}
-
-fn case(category: Category, ego_speed_mps: f64, principal: Participant, horizon_s: f64) -> Case {
-    let (ego_length_m, ego_width_m, lane_width_m) = (4.6, 1.9, 3.5);
-    Case { category, ego_length_m, ego_width_m, lane_width_m, ego_speed_mps, principal, ahead: None, horizon_s }
-}
-
-/// From 3.5 m beside the lane at 1 m/s: it overlaps the ego's path below 1.85 m, first at step 42 (1.68 s).
-fn cut_in(ego_mps: f64, other_mps: f64, horizon_s: f64) -> Case {
-    let lateral = Lateral::Kinematic { start_m: 3.5, rate_mps: -1.0, end_m: 0.0 };
-    case(Category::CutIn, ego_mps, vehicle(other_mps, lateral), horizon_s)
-}
-const ENCROACHES_S: f64 = 1.68;
 
 fn run_in<R: Real>(profile: &Profile, case: &Case, model: ModelId, gap_m: f64) -> Outcome<f64> {
     run_case(profile, case, model, Start::Gap(R::from_f64(gap_m)), &mut |_| ())
@@ -56,7 +41,8 @@ fn near(value: f64, expected: f64, relative: f64) {
 /// 20 m/s towards a vehicle that stands 100.4 m ahead: gap 100.4 m − 0.8 m·i, up to step 99.
 #[test]
 fn an_obstacle_at_constant_speed_has_the_values_of_the_closed_forms() {
-    let obstacle = case(Category::Lvd, 20.0, vehicle(0.0, Lateral::Centred), 100.0);
+    let mut obstacle = beside(0.0);
+    (obstacle.principal.speed, obstacle.horizon_s) = (Speed::constant(0.0), 100.0);
     let found = run(&unreacting(4.0), &obstacle, ModelId::Fsm, 100.4);
     let last_gap_m = 100.4 - 0.8 * 99.0;
     near(found.min_thw, last_gap_m / 20.0, 1e-12);
@@ -75,70 +61,6 @@ fn an_obstacle_at_constant_speed_has_the_values_of_the_closed_forms() {
     let hit = run(&unreacting(60.0), &obstacle, ModelId::Fsm, 100.4);
     assert_eq!((hit.contact_step, hit.min_thw, hit.max_drac), (126, 0.0, f64::INFINITY));
     assert_eq!(hit.tet_steps, 126 - 50);
-}
-
-#[test]
-fn an_ego_that_does_not_close_in_has_a_headway_and_nothing_else() {
-    let following = case(Category::Lvd, 25.0, vehicle(25.0, Lateral::Centred), 2.0);
-    let found = run(&unreacting(60.0), &following, ModelId::Fsm, 30.0);
-    near(found.min_thw, 1.2, 1e-12);
-    assert_eq!((found.max_drac, found.tet_steps, found.tit, found.pet), (0.0, 0, 0.0, None));
-    let standing = case(Category::Lvd, 0.0, vehicle(0.0, Lateral::Centred), 2.0);
-    assert_eq!(run(&unreacting(60.0), &standing, ModelId::Fsm, 5.0).min_thw, f64::INFINITY);
-}
-
-/// Both vehicles are approached in some steps; each step counts once.
-#[test]
-fn a_step_counts_once_with_the_nearer_of_two_vehicles() {
-    let slower = vehicle(18.0, Lateral::Kinematic { start_m: 0.0, rate_mps: 1.0, end_m: 3.5 });
-    let ahead = Some(Ahead { vehicle: vehicle(0.0, Lateral::Centred), gap_m: 40.0 });
-    let cut_out = Case { ahead, ..case(Category::CutOut, 20.0, slower, 3.5) };
-    let found = run(&unreacting(60.0), &cut_out, ModelId::Fsm, 5.0);
-    let alone = Case { ahead: None, ..cut_out.clone() };
-    // The slower vehicle is at 2.5 s and below until it is more than 1.9 m beside; the obstacle, 49.3 m ahead at the
-    // start, below 3 s from the first step on.
-    let of_slower = run(&unreacting(60.0), &alone, ModelId::Fsm, 5.0);
-    assert!(of_slower.tet_steps > 30 && of_slower.tet_steps < found.tet_steps);
-    assert_eq!(found.tet_steps, found.end_step + 1);
-}
-
-#[test]
-fn the_pet_of_an_ego_that_keeps_its_speed_is_its_headway_at_the_encroachment() {
-    // The ego reaches the place within the lane; or the lane ends before, because the other vehicle is faster.
-    for (ego_mps, other_mps, gap_m) in [(30.0, 20.0, 45.1), (20.0, 25.0, 20.1), (30.0, 20.0, 17.1)] {
-        let (profile, case) = (unreacting(60.0), cut_in(ego_mps, other_mps, 2.0));
-        let at_encroachment_m = gap_m + (other_mps - ego_mps) * ENCROACHES_S;
-        for (run, relative) in [(run_in::<f64> as fn(_, _, _, _) -> _, 1e-9), (run_in::<f32>, 1e-5)] {
-            near(run(&profile, &case, ModelId::Fsm, gap_m).pet.unwrap(), at_encroachment_m / ego_mps, relative);
-        }
-    }
-    let beside = run_in::<f64>(&unreacting(60.0), &cut_in(30.0, 20.0, 2.0), ModelId::Fsm, 16.0);
-    assert_eq!(beside.pet, None, "its rear bumper was beside the ego");
-}
-
-/// A vehicle that stands and slides across, 20 m ahead of an ego at 5 m/s that stops before it.
-#[test]
-fn an_ego_that_stops_before_the_place_has_an_infinite_pet() {
-    let profile = Profile::load("paper").unwrap();
-    for run in [run_in::<f64>, run_in::<f32>] {
-        let found = run(&profile, &cut_in(5.0, 0.0, 2.0), ModelId::Rss, 20.0);
-        assert_eq!((found.contact_step, found.pet), (u32::MAX, Some(f64::INFINITY)));
-        assert!(found.min_thw > 0.0 && found.max_drac.is_finite());
-    }
-}
-
-#[test]
-fn only_a_vehicle_that_comes_into_the_path_during_the_lane_has_a_pet() {
-    let profile = Profile::load("paper").unwrap();
-    let within = Lateral::Kinematic { start_m: 1.0, rate_mps: -0.5, end_m: 0.0 };
-    let beside = Lateral::Kinematic { start_m: 3.5, rate_mps: -1.0, end_m: 2.0 };
-    let leaves = Lateral::Kinematic { start_m: 0.0, rate_mps: 1.0, end_m: 3.5 };
-    let (cut_in, cut_out) = (Category::CutIn, Category::CutOut);
-    let cases = [(Category::Lvd, Lateral::Centred), (cut_in, within), (cut_in, beside), (cut_out, leaves)];
-    for (category, lateral) in cases {
-        let found = run(&profile, &case(category, 25.0, vehicle(20.0, lateral), 3.0), ModelId::Reg157, 40.0);
-        assert_eq!(found.pet, None, "{category:?}");
-    }
 }
 
 /// Values by their definitions from the steps of a lane, in binary64.

@@ -30,7 +30,6 @@ const PINNED_LANES: (u64, [&str; 2]) = (
 /// The first word of a lane without influence on verdicts and estimates.
 const MEASURES: usize = 12;
 
-/// Adds the words of a lane.
 fn add(digests: &mut [Sha256; 2], outcome: &Outcome<f64>) {
     for (at, word) in words(outcome).into_iter().enumerate() {
         digests[usize::from(at >= MEASURES)].update(word.to_le_bytes());

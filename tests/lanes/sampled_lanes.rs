@@ -134,30 +134,43 @@ fn samples_are_the_same_whatever_the_chunks_threads_and_instructions() {
     }
 }
 
+/// A device makes the same lanes as the host, in several calls.
+fn assert_alike(what: &str, plan: &LanePlan, device: &dyn Backend) {
+    let n = plan.unit_count();
+    let ours = outcomes(plan, &CpuBackend::lane_arithmetic(), &[0, n]);
+    let theirs = outcomes(plan, device, &[0, 3, n / 2, n]);
+    let differing = ours.iter().zip(&theirs).filter(|(a, b)| a != b).count();
+    assert_eq!((differing, theirs.len()), (0, ours.len()), "{what}");
+}
+
 #[test]
-fn a_device_makes_the_same_lanes_of_the_same_samples() {
-    let Some(backend) = common::device::software_backend() else { return };
-    let mut compared = 0;
+fn a_device_makes_the_same_lanes_of_the_same_samples_and_draws_headways_and_given_points_alike() {
+    let Some(device) = common::device::software_backend() else { return };
     // Cases of every parameterization; of a category's first one for every driver, under a profile with other attention.
     let firsts = Category::ALL.map(|of| Parameterization::ALL.into_iter().find(|id| id.category == of).unwrap());
     let paper = Parameterization::ALL.map(|id| ("paper", id, vec![ModelId::Cchdm, ModelId::Fsm]));
     let annex = firsts.map(|id| ("un-r157", id, ModelId::ALL.to_vec()));
     for (name, id, models) in paper.into_iter().chain(annex) {
-        let n = 400;
-        let options = SampleOptions { models, ..options(n) };
+        let options = SampleOptions { models, ..options(400) };
         let plan = plan_samples(&density(id.category, id.key, false), &Profile::load(name).unwrap(), &options).unwrap();
-        let ours = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
-        let theirs = outcomes(&plan, &*backend, &[0, 3, 150, n]);
-        let differing = ours.iter().zip(&theirs).filter(|(a, b)| a != b).count();
-        assert_eq!(differing, 0, "{name} {}: of {} lanes", id.key, ours.len());
-        compared += ours.len();
+        assert_alike(&format!("{name} {}", id.key), &plan, &*device);
     }
-    eprintln!("{compared} sampled lanes: 0 differ");
+    let profile = Profile::load("paper").unwrap();
+    for (category, key) in
+        [(Category::CutIn, "1"), (Category::CutOut, "b"), (Category::CutOut, "f"), (Category::Lvd, "ii")]
+    {
+        let density = density(category, key, true);
+        let options = SampleOptions { headways: SampleHeadways::Sampled, ..options(500) };
+        assert_alike(key, &plan_samples(&density, &profile, &options).unwrap(), &*device);
+        let points = density.kde.points();
+        let given = plan_points(&density, points, &profile, &ModelId::ALL, &SampleHeadways::Sampled).unwrap();
+        assert_alike(&format!("{key} given"), &given, &*device);
+    }
 }
 
 #[test]
 fn a_device_refuses_the_draws_that_the_host_refuses() {
-    let Some(backend) = common::device::software_backend() else { return };
+    let Some(device) = common::device::software_backend() else { return };
     let profile = Profile::load("paper").unwrap();
     for (category, key) in [(Category::CutIn, "7"), (Category::CutOut, "e"), (Category::CutOut, "g")] {
         // Left and right in one decomposition: many draws are in the wrong lane.
@@ -165,34 +178,11 @@ fn a_device_refuses_the_draws_that_the_host_refuses() {
         let fit = FitOptions { parameterization, valid_draws: 1000, ..FitOptions::default() };
         let id = Parameterization::find(category, key).unwrap();
         let density = DensityModel::fit(id, scenarios_of(12), &provenance(), &fit).unwrap().model;
-        let n = 400;
-        let plan = plan_samples(&density, &profile, &options(n)).unwrap();
+        let plan = plan_samples(&density, &profile, &options(400)).unwrap();
         let generator = plan.generator().unwrap();
-        let refused = (0..n).filter(|index| generator.draw(*index).tries > 1).count();
+        let refused = (0..400).filter(|index| generator.draw(*index).tries > 1).count();
         assert!(refused > 5, "{key}: {refused} refused");
-        let ours = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
-        assert!(ours == outcomes(&plan, &*backend, &[0, n]), "{key}");
-    }
-}
-
-#[test]
-fn a_device_draws_headways_and_given_points_alike() {
-    let Some(backend) = common::device::software_backend() else { return };
-    let profile = Profile::load("paper").unwrap();
-    let n = 500;
-    for (category, key) in
-        [(Category::CutIn, "1"), (Category::CutOut, "b"), (Category::CutOut, "f"), (Category::Lvd, "ii")]
-    {
-        let density = density(category, key, true);
-        let options = SampleOptions { headways: SampleHeadways::Sampled, ..options(n) };
-        let plan = plan_samples(&density, &profile, &options).unwrap();
-        let ours = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
-        assert!(ours == outcomes(&plan, &*backend, &[0, 77, n]), "{key}");
-        let points = density.kde.points();
-        let given = plan_points(&density, points, &profile, &ModelId::ALL, &SampleHeadways::Sampled).unwrap();
-        let last = points.len() as u64;
-        let ours = outcomes(&given, &CpuBackend::lane_arithmetic(), &[0, last]);
-        assert!(ours == outcomes(&given, &*backend, &[0, 5, last]), "{key} given");
+        assert_alike(key, &plan, &*device);
     }
 }
 

@@ -75,18 +75,6 @@ fn claims_are_judged_by_scenarios_and_need_enough_of_them() {
 }
 
 #[test]
-fn a_study_that_never_fails_has_no_score() {
-    let plan = plan(&[(Category::Lvd, 3, LVD)]);
-    let table = table(&plan, &|_| Verdicts(0));
-    let scores = &table.categories[0];
-    for cell in &scores.cells {
-        let values = (recall(&cell.counts), precision(&cell.counts), f1(&cell.counts));
-        assert_eq!(values, (None, None, None));
-        assert_eq!((cell.f1_interval, cell.failing_scenarios, cell.counts.tn), (None, 0, 30));
-    }
-}
-
-#[test]
 fn the_interval_covers_the_value_and_shrinks_with_the_number_of_scenarios() {
     let width = |units| {
         let plan = plan(&[(Category::Lvd, units, LVD)]);

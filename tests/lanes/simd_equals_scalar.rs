@@ -1,5 +1,4 @@
-//! Lanes in batches give the same output words as lanes run one by one, bit for bit, on every instruction set of
-//! this machine, whatever the profile, the number of threads and the cut into calls.
+//! Lanes in batches give the bits of lanes one by one, on every instruction set of this machine, however they are cut.
 
 use crate::common::lane_sets::{forms, random, small_study, thresholds};
 use crate::common::mined::scenarios_of;
@@ -12,7 +11,6 @@ use lanesweep::model::profile::Profile;
 use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::{Category, Scenario};
 
-/// Batches on every instruction set of this machine.
 fn in_batches() -> Vec<CpuBackend<f32>> {
     let sets = Instructions::available().into_iter().filter(|set| *set != Instructions::Scalar);
     sets.map(|set| CpuBackend::with_instructions(set).unwrap()).collect()
@@ -41,7 +39,8 @@ fn this_machine_runs_what_it_says_and_refuses_the_rest() {
 }
 
 #[test]
-fn random_lanes_and_lanes_on_thresholds_are_equal_under_every_profile() {
+fn a_small_study_random_lanes_and_lanes_on_thresholds_are_equal_under_every_profile() {
+    assert_equal("study", &small_study());
     for name in Profile::names() {
         let profile = Profile::load(name).unwrap();
         assert_equal(name, &random(&profile, 500));
@@ -56,11 +55,6 @@ fn lanes_are_equal_under_every_form_of_every_option_and_at_other_time_steps() {
         assert_equal(&what, &random(&profile, 50));
         assert_equal(&what, &thresholds(&profile, 1));
     }
-}
-
-#[test]
-fn every_word_of_a_small_study_is_equal() {
-    assert_equal("study", &small_study());
 }
 
 /// More headways than lanes wait at once, and numbers of them around those that a batch has: at the usual cap, and at

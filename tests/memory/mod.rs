@@ -78,14 +78,12 @@ unsafe impl GlobalAlloc for Counting {
     }
 }
 
-/// Begins the count of an input on this thread.
 pub fn begin(input: u64) {
     INPUT.set(input);
     LIVE.set(0);
     PEAK.set(0);
 }
 
-/// Whether this thread works on an input.
 pub fn is_counting() -> bool {
     INPUT.get() != NO_INPUT
 }

@@ -1,15 +1,7 @@
-//! Hostile and broken input: every reader of the library is given spoilt copies of valid inputs, and whatever it
-//! reads goes through the next step. No input may cause a panic, hold more than 1 GiB, or take longer than 5 s. A file that a
-//! run left (plan, part, journal) is refused, or read as it was written.
-//!
-//! The default is a quick look. The full run:
-//!
-//! ```text
-//! LANESWEEP_MUTATED_INPUTS=1000000 cargo test --release --test library mutated_inputs:: -- --nocapture
-//! ```
-//!
-//! Input `n` is the same in every run; `LANESWEEP_MUTATED_FIRST=n LANESWEEP_MUTATED_INPUTS=1` repeats it alone.
-//! Inputs run side by side; each one's parallel loops stay on its thread, so that memory is counted per input.
+//! Every reader of the library is given spoilt copies of valid inputs, and what it reads goes on to the next step: no panic,
+//! at most 1 GiB and 5 s; a plan, part or journal is refused, or read as it was written. The full run:
+//! `LANESWEEP_MUTATED_INPUTS=1000000 cargo test --release --test library mutated_inputs:: -- --nocapture`;
+//! `LANESWEEP_MUTATED_FIRST=n LANESWEEP_MUTATED_INPUTS=1` repeats input `n` alone.
 
 use crate::memory;
 mod mutate;
@@ -28,9 +20,7 @@ use mutate::mutated;
 use readers::Reader;
 use seeds::Seeds;
 
-/// Inputs of a quick run.
 const QUICK: u64 = 1600;
-/// Longest time of one input.
 const LONGEST: Duration = Duration::from_secs(5);
 /// An input that takes this long hangs: the process ends.
 const HANGS: Duration = Duration::from_secs(60);

@@ -1,5 +1,4 @@
-//! What writing a table holds in memory does not grow with its rows; what reading and planning a small file of
-//! scenarios holds stays small.
+//! What writing a table, or reading and planning a small file of scenarios, holds in memory.
 use crate::common::tables::made;
 use crate::memory;
 

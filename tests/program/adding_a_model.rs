@@ -1,8 +1,5 @@
-//! Adding a driver model touches one Rust file, one WGSL file and one line of the registry: the example of
-//! `examples/adding-a-driver-model` is built in a copy of the sources and runs on the CPU and on a device.
-//!
-//! Of `.ci/long`, because it compiles our crates a second time (minutes):
-//! `cargo test --release --test commands adding_a_model:: -- --ignored`
+//! The example of `examples/adding-a-driver-model` is built in a copy of the sources and runs on the CPU and on a device
+//! (minutes): `cargo test --release --test commands adding_a_model:: -- --ignored`
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,7 +8,6 @@ use std::process::{Command, Output};
 use crate::common::device::software_device;
 use crate::common::program::{Files, files, words};
 
-/// What a copy needs to be built.
 const SOURCES: [&str; 9] =
     ["Cargo.toml", "Cargo.lock", "README.md", "src", "shaders", "configs", "benches", "tests", "python"];
 
@@ -69,7 +65,6 @@ fn build(copy: &Path) {
     assert!(output.status.success(), "{command:?}: {}\n{}", output.status, said(&output));
 }
 
-/// Our packages that the program consists of.
 fn packages(copy: &Path) -> Vec<String> {
     let folders = fs::read_dir(copy.join("src")).unwrap().map(|entry| entry.unwrap());
     let crates = folders.filter(|entry| entry.path().join("Cargo.toml").exists());
@@ -81,7 +76,6 @@ fn target_dir() -> PathBuf {
     Path::new(env!("CARGO_TARGET_TMPDIR")).join("adding-a-model-target")
 }
 
-/// Runs the program that knows the new model.
 fn with_the_model(line: &str) -> Output {
     let program = target_dir().join("release").join(format!("lanesweep{}", std::env::consts::EXE_SUFFIX));
     Command::new(program).env("NO_COLOR", "1").args(words(line)).output().unwrap()

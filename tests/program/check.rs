@@ -9,14 +9,12 @@ use crate::common::program::{lanesweep, ran, words};
 
 const CASE: &str = "check --category cut-in --ego-speed 60km/h --speed 40km/h --gap 15 --lateral-speed 1";
 
-/// The document of a check.
 fn document(dir: &Path, line: &str) -> Value {
     let (code, out, error) = lanesweep(dir, &words(&format!("{line} --format json")));
     assert!([0, 1, 8, 9, 10].contains(&code), "{code} {error}");
     serde_json::from_str(&out).unwrap()
 }
 
-/// The document and the page of a check.
 fn sheet(dir: &Path, line: &str) -> (Value, String) {
     let document = document(dir, &format!("{line} --sheet case.html"));
     (document, std::fs::read_to_string(dir.join("case.html")).unwrap())

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use crate::common;
-use crate::common::program::{PROGRAM, json, ran, unbroken};
+use crate::common::program::{PROGRAM, ran, unbroken};
 
 /// The verbs of the program, or those of one of its verbs, as its own help lists them.
 pub fn verbs_of(verb: &str) -> Vec<String> {
@@ -65,9 +65,6 @@ fn help_names_every_verb_and_every_exit_code() {
     }
 }
 
-const CASE: &str = "simulate --category cut-in --ego-speed 30m/s --speed 20m/s --lateral-speed 1.5 --models Reg157";
-
-/// Runs the case in a shell with a limit.
 #[cfg(unix)]
 fn limited(limit: &str, args: &str) -> Output {
     let script = format!("ulimit {limit}; exec \"$0\" {args}");
@@ -85,7 +82,8 @@ fn an_address_space_that_is_too_small_is_told_with_its_limit_and_is_no_crash() {
     let mut limits = (20_000..400_000).step_by(1000).skip_while(|kib| !is_loaded(kib)).step_by(2).take(25);
     let (mut done, mut refused) = (0, 0);
     assert!(limits.all(|kib| {
-        let output = limited(&format!("-v {kib}"), &format!("{CASE} --thw 1 --threads 4096"));
+        let case = "--category cut-in --ego-speed 30m/s --speed 20m/s --lateral-speed 1.5 --models Reg157 --thw 1";
+        let output = limited(&format!("-v {kib}"), &format!("simulate {case} --threads 4096"));
         let said = unbroken(&output.stderr);
         match output.status.code() {
             Some(0) => done += 1,
@@ -116,23 +114,4 @@ fn too_many_open_files_are_answered_with_their_limit() {
         refused += u32::from(code == 6);
     }
     assert!(refused > 0);
-}
-
-#[test]
-fn threads_beyond_the_useful_number_are_not_started_and_change_nothing() {
-    let dir = tempfile::tempdir().unwrap();
-    let fit = "-q fit --synth-recordings 2 --categories cut-in --parameterizations 2";
-    ran(dir.path(), &format!("{fit} --config fit.valid_draws=1000 --out d.json"));
-    let estimate = |threads: &str| {
-        let sample = "-q sample d.json --samples 1000 --models FSM --backend cpu";
-        ran(dir.path(), &format!("{sample} --threads {threads} --out {threads}"));
-        let mut record = json(&dir.path().join(threads).join("estimate.json"));
-        record.as_object_mut().unwrap().remove("settings").unwrap();
-        let host = record.as_object_mut().unwrap().remove("host").unwrap();
-        (host["threads"].as_u64().unwrap(), record)
-    };
-    let ((_, one), (threads, many)) = (estimate("1"), estimate("2048"));
-    let cores = std::thread::available_parallelism().unwrap().get() as u64;
-    assert!(threads <= 4 * cores, "{threads} threads on {cores} cores");
-    assert_eq!(one, many);
 }

@@ -1,5 +1,4 @@
-//! The configuration: every verb takes it, every record names it, and schema and keys are the same. Which source wins stands
-//! in `tests/messages/config.md`.
+//! The configuration: every verb takes it, every record names it, and schema and keys are the same.
 
 use std::collections::BTreeSet;
 
@@ -39,7 +38,6 @@ fn every_verb_takes_its_values_from_all_layers() {
     assert!(record["data"].as_str().unwrap().contains("2 generated recordings of 100 s"));
 }
 
-/// Another valid value of a key, near its default.
 fn changed(key: &Key) -> Value {
     let default = key.default.clone().unwrap_or_default();
     match (&key.kind, key.name.as_str()) {

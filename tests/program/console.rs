@@ -81,7 +81,7 @@ fn every_answer_and_every_mistake_is_told_as_it_stands_in_the_messages() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/messages");
     let files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     let texts: Vec<_> = files.iter().filter(|path| path.extension().is_some_and(|ending| ending == "md")).collect();
-    assert_eq!(texts.len(), 8);
+    assert_eq!(texts.len(), 9);
     texts.par_iter().for_each(|text| {
         let dir = tempfile::tempdir().unwrap();
         crate::common::program::copy(&text.with_extension("in"), dir.path());

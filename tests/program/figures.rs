@@ -1,14 +1,11 @@
 //! The numbers of a study's figures are the ones that were looked at; how they are drawn, `book.rs` compares.
-//!
-//! `LANESWEEP_RENEW_FIGURES=1 cargo test --release --test commands figures::` writes the tables again, after a change that
-//! is meant.
+//! `LANESWEEP_RENEW_FIGURES=1 cargo test --release --test commands figures::` writes the tables again.
 
 use std::fs;
 use std::path::Path;
 
 use crate::common::program::ran;
 
-/// The figures of cut-ins whose tables are kept.
 const KEPT: [&str; 3] = ["f1", "radar", "headways"];
 
 #[test]

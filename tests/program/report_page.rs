@@ -52,7 +52,6 @@ fn page(dir: &Path) -> String {
     html.replace("&#x2f;", "/")
 }
 
-/// Scenarios of the generator, as lines of a scenario file.
 fn scenarios(dir: &Path) -> Vec<String> {
     quietly(dir, "tracks --convert recordings --synth-recordings 2 --config generator.duration_s=240");
     quietly(dir, "mine recordings --out all.jsonl");

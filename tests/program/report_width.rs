@@ -12,7 +12,6 @@ fn assert_fits(text: &str, width: usize) {
     }
 }
 
-/// stdout and stderr.
 fn study(dir: &Path, columns: &str, args: &[&str]) -> (String, String) {
     let output =
         command(dir, &[]).env("COLUMNS", columns).args(["study", "--backend", "cpu"]).args(args).output().unwrap();

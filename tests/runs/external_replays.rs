@@ -1,7 +1,7 @@
 //! S' given as series: of other programs, and of decompositions fitted on other folds.
 
 use crate::common::mined::scenarios_of;
-use crate::common::program::{done, said, table as csv, words};
+use crate::common::program::said;
 
 use lanesweep::scenario::write_scenarios;
 use serde_json::Value;
@@ -16,35 +16,6 @@ fn mined(dir: &Path) -> Vec<Value> {
 
 const STUDY: &str = "study --scenarios scenarios.jsonl --models FSM --thw 1 --out out";
 
-#[test]
-fn s_prime_of_other_programs_and_of_bases_of_other_folds_are_scored() {
-    let dir = tempfile::tempdir().unwrap();
-    mined(dir.path());
-    // S itself as S' of another program, in a file whose name is no key.
-    std::fs::copy(dir.path().join("scenarios.jsonl"), dir.path().join("my same.v2.jsonl")).unwrap();
-    let study = words("-q study --scenarios scenarios.jsonl --categories cut-in --out study --external");
-    done(dir.path(), &[&study[..], &["my same.v2.jsonl"]].concat());
-    // F1 of every driver and criterion of a variant, where it is defined.
-    let scores = |folder: &str, category: &str, variant: &str| -> Vec<String> {
-        let rows = csv(&dir.path().join(folder).join("results.csv")).into_iter();
-        let own =
-            rows.filter(|row| row["category"] == category && row["variant"] == variant && row["headway"] == "all");
-        own.map(|row| row["f1"].clone()).filter(|f1| !f1.is_empty()).collect()
-    };
-    let same = scores("study", "cut_in", "my-same-v2");
-    assert!(same.len() > 3 && same.iter().all(|f1| f1 == "1"), "{same:?}");
-    assert!(scores("study", "cut_in", "5-cv").iter().any(|f1| f1 != "1"));
-    let folds = std::fs::read_to_string(dir.path().join("study/tables/folds.csv")).unwrap();
-    assert_eq!(folds.lines().next(), Some("id,fold"));
-    #[cfg(feature = "parquet")]
-    {
-        write_scenarios(&dir.path().join("as-parquet.parquet"), scenarios_of(8)).unwrap();
-        let study = "-q study --scenarios scenarios.jsonl --external as-parquet.parquet --out parquet";
-        done(dir.path(), &words(study));
-        assert!(scores("parquet", "lvd", "as-parquet").iter().all(|f1| f1 == "1"));
-    }
-}
-
 fn scale(value: &mut Value, factor: f64) {
     match value {
         Value::Array(values) => values.iter_mut().for_each(|value| scale(value, factor)),
@@ -52,7 +23,6 @@ fn scale(value: &mut Value, factor: f64) {
     }
 }
 
-/// Every second sample of the target.
 fn thin(row: &mut Value) {
     for of in ["v", "y"] {
         let values = row["target"][of].as_array_mut().unwrap();
@@ -60,7 +30,6 @@ fn thin(row: &mut Value) {
     }
 }
 
-/// Without the first half a second.
 fn shorten(row: &mut Value) {
     for of in ["target", "lead"] {
         for series in ["v", "y"] {
@@ -91,14 +60,8 @@ fn what_is_strange_about_s_prime_is_said_and_what_cannot_be_one_is_refused() {
             format!("{row}\n")
         });
         std::fs::write(dir.join("own.jsonl"), changed.collect::<String>()).unwrap();
-        said(
-            dir,
-            &format!(
-                "{STUDY} --categories {} --external own.jsonl",
-                rows[0]["category"].as_str().unwrap().replace('_', "-")
-            ),
-        )
-        .1
+        let category = rows[0]["category"].as_str().unwrap().replace('_', "-");
+        said(dir, &format!("{STUDY} --categories {category} --external own.jsonl")).1
     };
     type Change<'a> = &'a dyn Fn(&mut Value);
     let cases: [(&[Value], Change, &str); 8] = [

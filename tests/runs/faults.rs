@@ -1,7 +1,5 @@
-//! Faults of the world around a run: a disk that is full or read-only, a limit of the size of files, a folder that
-//! vanishes, a worker that panics, a device that is lost, a clock that jumps. Each leaves a whole result or one that the
-//! same command completes; the message tells which, and the result in the end is that of the undisturbed run, byte for
-//! byte. What the machine does not allow (mounts, another user) is skipped loudly.
+//! Faults of the world around a run: each leaves a whole result or one that the same command completes, byte for byte the
+//! undisturbed one. What the machine does not allow (mounts, another user) is skipped loudly.
 #![cfg(unix)]
 
 use crate::common::{self, page, program};
@@ -22,7 +20,6 @@ fn same(found: &Path, undisturbed: &Path) {
     program::same(&found, &expected, &undisturbed.display().to_string());
 }
 
-/// A folder with scenarios and a density.
 struct Bench {
     dir: tempfile::TempDir,
 }

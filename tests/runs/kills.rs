@@ -1,8 +1,5 @@
-//! A run that is killed (SIGKILL, as a power cut or the system's memory killer would) at any moment leaves the files of
-//! one run beside a record, or no record; started again it ends as if undisturbed. Two processes on one folder: each ends
-//! as if alone or is refused. One run for each mechanism: publish of a folder (also over another run's), journal and
-//! resume, merge, files that are results by themselves. The long form is
-//! `LANESWEEP_KILLS=300 cargo test --release --test commands kills:: -- --nocapture`.
+//! A run that is killed at any moment leaves the files of one run beside a record, or no record; started again it ends as if
+//! undisturbed. Long: `LANESWEEP_KILLS=300 cargo test --release --test commands kills:: -- --nocapture`
 #![cfg(unix)]
 
 use crate::common::program::{self, Files, ended, kill, names, same, unbroken, without_times, words};
@@ -12,10 +9,8 @@ use std::path::Path;
 use std::process::Child;
 use std::time::{Duration, Instant};
 
-/// Lists the files of a folder's runs.
 const LIST: &str = "lanesweep-files.json";
 
-/// A run at work on the folder `out`.
 struct Verb {
     name: &'static str,
     /// With it, the files beside it are those of one run; none where each file is a result by itself.
@@ -65,12 +60,10 @@ fn is_beside(name: &str) -> bool {
     is_of_work || name == "plan.json" || name == LIST
 }
 
-/// Whether files are getting their names.
 fn is_switching(dir: &Path) -> bool {
     std::fs::read_to_string(dir.join(LIST)).is_ok_and(|text| text.contains("\"is_complete\":false"))
 }
 
-/// The results of a folder.
 fn files(dir: &Path) -> Files {
     let mut files = program::files(dir);
     files.retain(|name, _| !is_beside(name));
@@ -93,7 +86,6 @@ fn put(dir: &Path, from: Option<&str>) {
     }
 }
 
-/// What the verbs read.
 fn furnish(dir: &Path) {
     done(dir, "fit --synth-recordings 2 --categories cut-in --parameterizations 2 --out d.json");
     let plan = "study --synth-recordings 1 --config study.reference=true --dt 0.02 --plan-only";

@@ -3,7 +3,6 @@
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crate::common::program::{command, unbroken, words};
 use lanesweep::Error;
 use lanesweep::run::parts::{Journal, Records};
 use lanesweep::support::lock::FolderLock;
@@ -70,25 +69,4 @@ fn a_lock_has_one_holder_and_a_killed_ones_is_taken_over() {
     };
     std::thread::scope(|scope| (0..8).for_each(|_| drop(scope.spawn(come_and_go))));
     assert!(taken.into_inner() > 0);
-}
-
-/// A part of an array (--array=3,7) computes the shards that the whole array computed under these numbers.
-#[test]
-fn a_shard_takes_its_number_from_the_cluster() {
-    let dir = tempfile::tempdir().unwrap();
-    let small =
-        "-q study --synth-recordings 1 --config generator.duration_s=120 --categories lvd --out out --shard auto/";
-    let with = |of: &str, variables: &[(&str, &str)]| {
-        let line = format!("{small}{of}");
-        let output = command(dir.path(), &words(&line)).envs(variables.iter().copied()).output().unwrap();
-        (output.status.code(), unbroken(&output.stderr))
-    };
-    let slurm = [("SLURM_ARRAY_TASK_ID", "3"), ("SLURM_ARRAY_TASK_MIN", "3")];
-    let (code, said) = with("3", &slurm);
-    assert!(code == Some(2) && said.contains("no shard 3 of 3") && said.contains("Slurm array"), "{said}");
-    assert_eq!(with("20", &slurm).0, Some(0));
-    assert_eq!(with("5", &[("JOB_COMPLETION_INDEX", "4")]).0, Some(0));
-    for part in ["part-00003-of-00020.json", "part-00004-of-00005.json"] {
-        assert!(dir.path().join("out").join(part).exists(), "{part}");
-    }
 }

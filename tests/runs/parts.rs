@@ -1,10 +1,6 @@
-//! Runs in parts: whatever the number and order of shards, and wherever a run was interrupted, the result is that of
-//! the undisturbed run, byte for byte; a folder that cannot give it says what is missing. Journal, lock and the numbers of
-//! shards by themselves are in `mechanisms.rs`.
+//! Runs in parts: whatever the shards and interruptions, the result is that of the undisturbed run, byte for byte.
 
-use crate::common::program::{
-    self, flat, kill, lanesweep, limited, ran, start, unbroken, wait_for_run, without_host, words,
-};
+use crate::common::program::{self, flat, kill, lanesweep, ran, start, unbroken, wait_for_run, without_host, words};
 
 use std::path::Path;
 
@@ -42,31 +38,6 @@ fn a_study_in_shards_is_the_study_in_one_piece() {
     let planned = "-q study --plan plan/plan.json --backend cpu --out";
     assert_eq!(ran(dir, &format!("{planned} planned")), whole);
     same(&dir.join("whole"), &dir.join("planned"));
-}
-
-/// 8,000 scenarios had 22 kB each in a plan: 600 MB to write it, 450 MB to read it.
-#[cfg(unix)]
-#[test]
-fn a_plan_of_many_scenarios_takes_little_memory() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    let golden = std::fs::read_to_string(crate::common::golden("paper_sumo_01_02_scenarios.jsonl")).unwrap();
-    let rows: Vec<serde_json::Value> = golden.lines().map(|line| line.parse().unwrap()).collect();
-    let line = |(number, row): (i32, &serde_json::Value)| {
-        let mut row = row.clone();
-        row["id"] = format!("{}~{number}", row["id"].as_str().unwrap()).into();
-        format!("{row}\n")
-    };
-    let many = (0..8000).zip(rows.iter().filter(|row| row["kept"] == true).cycle()).map(line);
-    std::fs::write(dir.join("many.jsonl"), many.collect::<String>()).unwrap();
-    // Addresses, not memory that is in use: the limit that a shell can set.
-    for args in ["--scenarios many.jsonl --plan-only", "--plan p/plan.json --shard 7/400"] {
-        let study = format!("-q --threads 1 study --backend cpu --out p {args}");
-        let (code, _, err) = limited(dir, "ulimit -v 400000", &words(&study));
-        assert_eq!(code, 0, "{args}: {err}");
-    }
-    let bytes = std::fs::metadata(dir.join("p/plan.json")).unwrap().len();
-    assert!(bytes < 8000 * 3000, "{bytes} bytes");
 }
 
 #[test]

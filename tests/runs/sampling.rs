@@ -1,5 +1,4 @@
-//! Sampling runs: the same counts and the same failing lanes however a run is cut up, and what the command line makes
-//! of good and bad input.
+//! Sampling runs: the same counts and the same failing lanes however a run is cut up.
 
 use crate::common::mined::density_of;
 use crate::common::program::{json, ran, refused, table};
@@ -21,7 +20,6 @@ fn density(category: Category, key: &str) -> DensityModel {
     density_of(24, category, key, false)
 }
 
-/// A folder with a density file in it.
 fn folder() -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     write_density(&dir.path().join("density.json"), &density(Category::CutIn, "2")).unwrap();
@@ -182,24 +180,6 @@ fn a_searched_proposal_can_be_sampled_again_and_in_shards_with_its_failing_draws
     }
 }
 
-/// The half-width decides how a question is answered, and every question is answered.
-#[test]
-fn auto_answers_frequent_failures_by_crude_lanes_and_rare_ones_by_importance_sampling() {
-    let dir = folder();
-    let line = "-q sample density.json --thw 0.3,2.1 --models FSM --backend cpu --half-width 0.2";
-    let text = ran(dir.path(), line);
-    assert!(text.contains("Rare failures, by importance sampling"), "{text}");
-    let table = estimates(dir.path(), "lanesweep-sample");
-    let mut estimators = Vec::new();
-    for line in table.lines().filter(|line| line.contains("FSM,collision") && !line.contains(",all,")) {
-        let cell: Vec<&str> = line.split(',').collect();
-        let [p, low, high] = [8, 13, 14].map(|at| cell[at].parse::<f64>().unwrap());
-        assert!(p > 0.0 && (high - low) / (2.0 * p) < 0.25, "{line}");
-        estimators.push(cell[2]);
-    }
-    assert_eq!(estimators, ["mc", "is"]);
-}
-
 #[test]
 fn p_at_both_ends_of_the_bandwidths_interval_is_that_of_the_density_there_by_either_estimator() {
     let (profile, cpu) = (Profile::load("paper").unwrap(), CpuBackend::lane_arithmetic());
@@ -242,21 +222,6 @@ fn p_at_both_ends_of_the_bandwidths_interval_is_that_of_the_density_there_by_eit
     }
 }
 
-#[test]
-fn a_search_alone_finds_the_same_probability_with_few_lanes_and_never_calls_it_sound() {
-    let dir = folder();
-    let base = "-q sample density.json --thw 2 --models FSM --backend cpu --estimator is --half-width 0.2";
-    let text = ran(dir.path(), &format!("{base} --assurance search --out search"));
-    assert!(text.contains("not bounded"), "{text}");
-    ran(dir.path(), &format!("{base} --out draws"));
-    let [alone, bounded] = ["search", "draws"].map(|of| table(&dir.path().join(of).join("estimates.csv")).remove(0));
-    let number = |row: &BTreeMap<String, String>, column: &str| row[column].parse::<f64>().unwrap();
-    assert!(["searched", "doubtful"].contains(&&*alone["draws"]) && bounded["draws"] == "sound", "{alone:?}");
-    assert!(number(&alone, "runs") < 60_000.0 && number(&alone, "crude_fraction") == 0.0, "{alone:?}");
-    assert!(number(&alone, "draws_low") < number(&bounded, "draws_high"), "{alone:?} {bounded:?}");
-    assert!(number(&alone, "draws_high") > number(&bounded, "draws_low"), "{alone:?} {bounded:?}");
-}
-
 /// The density over the first scenarios only, scale and bandwidth held.
 fn of_few(density: &DensityModel, scenarios: usize) -> DensityModel {
     let kde = &density.kde;
@@ -282,7 +247,6 @@ fn estimated(dir: &Path, density: &str, more: &str) -> (serde_json::Value, Strin
     (json(&dir.join("lanesweep-sample/estimate.json")), text)
 }
 
-/// Ends of a row's interval.
 fn interval(row: &serde_json::Value) -> [f64; 2] {
     ["low", "high"].map(|end| row["estimate"]["interval"][end].as_f64().unwrap())
 }

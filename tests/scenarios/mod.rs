@@ -1,7 +1,6 @@
 //! Scenario files, tables of users, parameterizations, OpenSCENARIO.
 
 mod openscenario;
-mod printed_json;
 mod reduction_goldens;
 mod scenario_file;
 mod tables;

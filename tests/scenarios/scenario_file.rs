@@ -1,5 +1,4 @@
-//! The scenario file: what is written is read to the last bit, and what cannot be a scenario is refused
-//! with the line, the scenario and the field.
+//! The scenario file: what is written is read to the last bit.
 
 use lanesweep::model::plausibility::Implausible;
 use lanesweep::scenario::{

@@ -1,5 +1,4 @@
-//! Tables: what is written as Parquet is what CSV and JSON Lines say, to the last bit and with its unit; what users
-//! make themselves is read, or refused with file, row and column.
+//! Tables: what is written as Parquet is what CSV and JSON Lines say, to the last bit and with its unit.
 #![cfg(feature = "parquet")]
 
 use crate::common::dice::{Dice, cases};

@@ -1,5 +1,4 @@
-//! Tables of scenarios and cases that users make: what is read of them. What is said of those that cannot be read stands in
-//! `tests/messages/tables.md`.
+//! Tables of scenarios and cases that users make: what is read of them (what is refused: `tests/messages/tables.md`).
 #![cfg(feature = "parquet")]
 
 use crate::common::program::{ran, said};
@@ -57,7 +56,6 @@ a,cut-in,FSM,108,20,1.2,,1.0,,,,,,
 c,cut-out,FSM,108,,1.2,,1.0,,,40,36,4,
 ";
 
-/// The numbers of a series but for its last row.
 fn before_end(series: &str) -> Vec<f64> {
     let steps: Vec<&str> = series.lines().skip(1).collect();
     let before_end = &steps[..steps.len() - 1];
@@ -126,7 +124,6 @@ fn numbers(values: &[f64]) -> ArrayRef {
     Arc::new(Float64Array::from(values.to_vec()))
 }
 
-/// The least that a table of series has.
 fn required_columns() -> Vec<(&'static str, ArrayRef)> {
     vec![
         ("id", texts(&["a", "b"])),

@@ -1,9 +1,5 @@
-//! How often the intervals of differences hold the truth, and how often verdicts about claims are wrong, over 1,000
-//! simulated studies of populations whose scores are known. Minutes long:
-//!
-//! ```text
-//! cargo test --release --test library claim_coverage:: -- --ignored --nocapture
-//! ```
+//! How often intervals of differences hold the truth and verdicts about claims are wrong, over 1,000 simulated studies
+//! (minutes): `cargo test --release --test library claim_coverage:: -- --ignored --nocapture`
 
 use lanesweep::engine::Confusion;
 use lanesweep::run::score::{ClaimVerdict, Contrast, ScenarioRate, ScoreInterval, f1, min_contrast};
@@ -15,7 +11,6 @@ const REPEATS: u64 = 1000;
 /// As the claims and the answer of a study have it.
 const MIN_FAILING: usize = 10;
 
-/// Scenarios from which parameterizations are scored.
 #[derive(Clone)]
 struct Population {
     /// Share of scenarios in which S fails from some headway.
@@ -43,7 +38,6 @@ impl Uniform {
 }
 
 impl Population {
-    /// The counts of one scenario, a parameterization after the other.
     fn scenario(&self, random: &mut Uniform) -> Vec<Confusion<u32>> {
         let s = if random.next() < self.failing { 1 + (10.0 * random.next() * random.next()) as i32 } else { 0 };
         let (shared, is_shared) = ((random.next(), random.shift()), random.next() < self.common);

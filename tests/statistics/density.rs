@@ -1,5 +1,4 @@
-//! Densities: what published programs give, what must hold of any density, and the way from a scenario to a
-//! point and on to a case.
+//! Densities: what published programs give, what must hold of any, and the way from a scenario to a point and to a case.
 
 use crate::common;
 use crate::common::mined::{self, scenarios_of};

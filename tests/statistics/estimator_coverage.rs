@@ -1,8 +1,5 @@
-//! How often the 95 % intervals hold the truth, over 1,000 seeded repeats of every estimator. Minutes long:
-//!
-//! ```text
-//! cargo test --release --test library estimator_coverage:: -- --ignored --nocapture
-//! ```
+//! How often the 95 % intervals hold the truth, over 1,000 seeded repeats of every estimator (minutes):
+//! `cargo test --release --test library estimator_coverage:: -- --ignored --nocapture`
 
 use lanesweep::engine::Confusion;
 use lanesweep::run::score::{ScoreOptions, f1, f1_interval};
@@ -172,7 +169,6 @@ fn confusion(random: &mut ChaCha8Rng, failing: f64, wrong: f64) -> Confusion<u32
     }
 }
 
-/// The interval that resampling the scenarios gives.
 fn percentiles(n: usize, seed: u64, of: impl Fn(&[usize]) -> Option<f64>) -> Option<(f64, f64)> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     random.set_stream(1);

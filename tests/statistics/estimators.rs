@@ -1,5 +1,4 @@
-//! What the estimators of rare failures promise, on problems whose probability is known. Coverage over many repeats:
-//! `tests/statistics/estimator_coverage.rs`.
+//! What the estimators of rare failures promise, on problems whose probability is known.
 
 use lanesweep::stats::density::Mixture;
 use lanesweep::stats::estimate::{

@@ -6,5 +6,4 @@ mod drawn_scenarios;
 mod estimator_coverage;
 mod estimators;
 mod estimators_on_lanes;
-mod fit;
 mod random;

@@ -1,5 +1,4 @@
-//! Recordings whose numbers are plausible one by one, but not beside one another: a mirrored axis, another reference point, a
-//! speed that is not that of the positions. What is wrong with a number or a line stands in `tests/messages/recordings.md`.
+//! Recordings whose numbers are plausible one by one, but not beside one another.
 
 use crate::common::exid::Plain;
 use crate::common::small::{self, Texts, cruising};

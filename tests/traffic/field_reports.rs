@@ -19,7 +19,6 @@ fn steady(x: f64, v: f64, y: f64) -> Vehicle {
     vehicle([4.5, 1.8], move |t| [x + v * t, y])
 }
 
-/// From one lateral position to another, in the usual quintic.
 fn across(from: f64, to: f64, begin: f64, end: f64) -> impl Fn(f64) -> f64 {
     move |t| {
         let part = ((t - begin) / (end - begin)).clamp(0.0, 1.0);
@@ -204,45 +203,12 @@ fn a_road_with_a_ramp_has_the_same_lanes() {
     let lane = |[x, y]: [f64; 2]| match (x < 100.0, y) {
         (true, ..0.0) => "ramp_0",
         (false, ..0.0) => "e2_0",
-        (_, ..3.5) => {
-            if x < 100.0 {
-                "e1_0"
-            } else {
-                "e2_1"
-            }
-        }
-        _ => {
-            if x < 100.0 {
-                "e1_1"
-            } else {
-                "e2_2"
-            }
-        }
+        (true, ..3.5) => "e1_0",
+        (false, ..3.5) => "e2_1",
+        (true, _) => "e1_1",
+        (false, _) => "e2_2",
     };
     let found = mined(&table(&all, 10.0, &|k| format!("{},", k as f64 / 10.0), &lane));
     let [one] = &found.scenarios[..] else { panic!("{:?}", found.scenarios) };
     assert!((one.lane_width - 3.5).abs() < 0.02, "{}", one.lane_width);
-}
-
-#[test]
-fn given_scenarios_are_kept_as_given_unless_the_filters_are_asked_for() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("own.csv");
-    let mut text = "id,category,t,ego_speed_mps,gap,target_speed_mps,target_lateral_m,side,ego_length,ego_width,\
-                    target_length,target_width,lane_width\n"
-        .to_owned();
-    // The second is not slower, the third is far.
-    for (id, speed, gap) in [("a", 24, 30), ("b", 30, 30), ("c", 24, 70)] {
-        for k in 0..30 {
-            let (t, y) = (f64::from(k) / 10.0, 3.5 - 0.1 * f64::from(k));
-            writeln!(text, "{id},cut-in,{t},30,{gap},{speed},{y:.2},left,4.5,1.8,4.5,1.8,3.5").unwrap();
-        }
-    }
-    std::fs::write(&path, text).unwrap();
-    for (filter, expected) in [(false, 3), (true, 1)] {
-        let source = Source::Scenarios { path: path.clone(), filter };
-        let found = source.load(&MiningOptions::default(), Implausible::Refused, || Ok(())).unwrap();
-        assert_eq!(kept(&found, Category::CutIn).len(), expected, "{:?}", found.notes);
-        assert_eq!(says(&found, "kept as given; by the filters (option `filter`) kept: 1 of 3 cut-ins"), !filter);
-    }
 }

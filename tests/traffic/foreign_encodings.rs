@@ -34,14 +34,12 @@ fn packed(text: &str) -> Vec<u8> {
     encoder.finish().unwrap()
 }
 
-/// The recording with frames that begin at 0.
 fn from_frame_0(mut recording: Recording) -> Recording {
     let first = recording.tracks.iter().map(|track| track.first_frame).min().unwrap();
     recording.tracks.iter_mut().for_each(|track| track.first_frame -= first);
     recording
 }
 
-/// The table with other texts in the column of times.
 fn with_times(text: impl Fn(f64) -> String) -> Plain {
     let mut table = table();
     let t = table.at("t");

@@ -1,5 +1,4 @@
-//! Tables and folders of others: every file is read or named, no preset takes a table that it would read in part, and what
-//! nothing tells is asked.
+//! Tables and folders of others: every file is read or named, and no preset takes a table that it would read in part.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -27,7 +26,6 @@ fn understood(table: &Plain) -> lanesweep::Result<Understanding> {
     crate::traffic::tracks::understood(table, &|_| ())
 }
 
-/// The first finding that refuses a table.
 fn grave(about: &Understanding) -> &str {
     about.findings.iter().find(|finding| finding.is_grave).map_or("", |finding| &finding.text)
 }
@@ -63,30 +61,7 @@ fn every_file_of_a_folder_is_read_or_named() {
     write("settings.toml", "a = 1\n");
     write("classes.csv", "class,meaning\n1,car\n");
     assert_eq!(read_and_named(dir.path()), (1, ["b.csv", "c.csv.gz", "d.csv.zip"].map(str::to_owned).to_vec()));
-}
-
-#[test]
-fn a_folder_of_foreign_files_says_what_was_tried() {
-    let dir = tempfile::tempdir().unwrap();
-    fs::write(dir.path().join("a.csv"), "one,two\n1,2\n").unwrap();
-    fs::write(dir.path().join("b.csv.zip"), "packed").unwrap();
-    fs::write(dir.path().join("c.pdf"), "page").unwrap();
-    fs::write(dir.path().join("d.xml"), "<fcd-export></fcd-export>").unwrap();
-    fs::write(dir.path().join("e.json.gz"), "[]").unwrap();
-    let error = Inputs::of(dir.path(), None).unwrap_err().to_string();
-    let tried = ["a.csv: no preset fits", "b.csv.zip: compressed", "c.pdf: no format of tracks"];
-    let in_python =
-        ["d.xml: XML is not read; make a table in Python: `lanesweep.tracks.sumo`", "e.json.gz: JSON is not read"];
-    for words in tried.iter().chain(&in_python) {
-        assert!(error.contains(words), "{error}");
-    }
-    assert!(!error.contains("tracksMeta"), "{error}");
-}
-
-/// SUMO writes no sizes, so a table with the usual names of sizes is that of another program.
-#[test]
-fn a_table_with_sizes_is_not_taken_for_one_without() {
-    let dir = tempfile::tempdir().unwrap();
+    // SUMO writes no sizes, so a table with the usual names of sizes is that of another program.
     let path = dir.path().join("table.csv");
     for (header, preset) in [
         ("id,time,x,y,speed,lane,angle,type", "sumo-fcd"),
@@ -144,7 +119,6 @@ fn a_peak_of_one_sample_beyond_what_is_physical_is_refused() {
     assert!(grave(&about).contains("beyond what is physical for an acceleration"), "{:?}", about.findings);
 }
 
-/// The rows of each vehicle, in the order of time.
 fn rows_by_vehicle(table: &Plain) -> BTreeMap<u32, Vec<usize>> {
     let mut rows: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     (0..table.rows.len()).for_each(|at| rows.entry(table.rows[at][0].parse().unwrap()).or_default().push(at));

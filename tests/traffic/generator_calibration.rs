@@ -1,7 +1,4 @@
-//! The synthetic recordings beside the published figures they are calibrated to.
-//!
-//! Run `cargo test --release --test library generator_calibration:: -- --nocapture` to see the tables: figure,
-//! published, ours, and the span outside of which the test fails.
+//! The synthetic recordings beside the published figures they are calibrated to; `-- --nocapture` prints the tables.
 
 mod traffic;
 
@@ -72,7 +69,6 @@ struct Counted {
 }
 
 impl Counted {
-    /// Some of the default recordings.
     fn of_the_default() -> &'static Counted {
         static COUNTED: LazyLock<Counted> = LazyLock::new(|| Counted::of(recordings(28)));
         &COUNTED

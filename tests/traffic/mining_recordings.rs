@@ -13,7 +13,6 @@ fn mined(dir: &Path, id: &str) -> Mined {
     mine(&read(&HighdFiles::named(dir, id)).unwrap().recording, &MiningOptions::default())
 }
 
-/// Scenarios of some recordings by id.
 fn by_id(dir: &Path, recordings: &[&str]) -> BTreeMap<String, Scenario> {
     recordings.iter().flat_map(|id| mined(dir, id).scenarios).map(|s| (s.id.clone(), s)).collect()
 }

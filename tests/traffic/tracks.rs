@@ -1,5 +1,4 @@
-//! Tracks in other formats: the same traffic gives the same scenarios, and a file that contradicts itself is not used in
-//! silence.
+//! Tracks in other formats: the same traffic gives the same scenarios; files that contradict themselves are refused.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -40,7 +39,6 @@ fn load_exid(dir: &Path) -> Loaded {
     load(dir).unwrap().remove(0)
 }
 
-/// Scenarios by category, ego and target, with their first frames.
 fn by_vehicles(scenarios: Vec<Scenario>) -> BTreeMap<(Category, u32, u32), Vec<Scenario>> {
     let mut all: BTreeMap<(Category, u32, u32), Vec<Scenario>> = BTreeMap::new();
     for scenario in scenarios {
@@ -143,12 +141,10 @@ pub fn understood(table: &Plain, change: &dyn Fn(&mut Preset)) -> lanesweep::Res
     read(table, change).map(|read| read.understanding)
 }
 
-/// A fact of a recording.
 pub fn fact<'a>(about: &'a Understanding, name: &str) -> &'a str {
     about.facts.iter().find(|(of, _)| *of == name).map_or("", |(_, text)| text)
 }
 
-/// Whether a finding has these words.
 pub fn says(about: &Understanding, words: &str) -> bool {
     about.findings.iter().any(|finding| finding.text.contains(words))
 }
@@ -476,7 +472,6 @@ fn in_format_of(preset: &Preset, recording: &Recording, stride: usize, mistake: 
     text
 }
 
-/// A table as Parquet.
 #[cfg(feature = "parquet")]
 fn write_parquet(path: &Path, text: &str, vehicle: &str) {
     use arrow_array::{ArrayRef, Float64Array, Int64Array, StringArray};

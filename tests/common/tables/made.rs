@@ -15,7 +15,6 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::basic::Compression;
 use parquet::file::properties::WriterProperties;
 
-/// A file as its readers see it.
 pub struct Read {
     pub columns: Vec<String>,
     /// Unit and description of each column.
@@ -63,7 +62,6 @@ fn texts(array: &ArrayRef) -> Vec<String> {
     (0..array.len()).map(text).collect()
 }
 
-/// A list of numbers per row.
 pub fn series(rows: &[Vec<f64>]) -> ArrayRef {
     let mut builder = ListBuilder::new(Float64Builder::new());
     for row in rows {

@@ -2,12 +2,10 @@
 
 use crate::common::dice::Dice;
 
-/// Numbers that programs stumble over.
 const NUMBERS: &str = "NaN inf -inf Infinity 1e308 -1e308 1e400 5e-324 1e-300 1e-9 1e-3 -1 0 -0.0 1 \
     2 3 1.0 0.5 63 64 65 255 256 65536 1000000 1000000.0 2147483647 \
     2147483648 4000000000 4294967295 4294967296 9007199254740993 9223372036854775807 -9223372036854775808 18446744073709551615 18446744073709551616 null 1e6 1e15";
 
-/// Fragments of the formats.
 const FRAGMENTS: [&str; 18] = [
     "[", "]", "{", "}", ",", ":", "\"", "\n", "\r\n", "\u{feff}", "\0", "null", "true", "[]", "{}", "\\u0000", "\t",
     ";",
@@ -80,7 +78,6 @@ fn insert(bytes: &mut Vec<u8>, at: usize, part: &[u8]) {
     bytes.splice(at..at, part.iter().copied());
 }
 
-/// Swaps, repeats or removes a line.
 fn change_lines(dice: &mut Dice, bytes: &mut Vec<u8>) {
     let mut lines: Vec<Vec<u8>> = bytes.split(|&b| b == b'\n').map(<[u8]>::to_vec).collect();
     let (a, b) = (dice.below(lines.len()), dice.below(lines.len()));
@@ -92,7 +89,6 @@ fn change_lines(dice: &mut Dice, bytes: &mut Vec<u8>) {
     *bytes = lines.join(&b'\n');
 }
 
-/// Where numbers stand.
 fn numbers(bytes: &[u8]) -> Vec<std::ops::Range<usize>> {
     let part = |b: u8| b.is_ascii_digit() || matches!(b, b'-' | b'+' | b'.' | b'e' | b'E');
     let mut found = Vec::new();

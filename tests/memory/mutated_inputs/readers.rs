@@ -22,7 +22,6 @@ use lanesweep::{Error, Place, Result};
 
 use super::seeds::Seeds;
 
-/// One kind of input.
 pub struct Reader {
     pub name: &'static str,
     pub seeds: Vec<Vec<u8>>,
@@ -166,7 +165,6 @@ fn parameterization(bytes: &[u8], _: &Path, seeds: &Seeds, _: bool) -> Result<()
     study(&seeds.scenarios[..3], &seeds.profile, &options, false)
 }
 
-/// The plan of a few samples.
 pub fn small_plan(density: &DensityModel, profile: &Profile) -> Result<LanePlan> {
     let options = SampleOptions {
         seed: 5,

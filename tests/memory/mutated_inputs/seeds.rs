@@ -23,12 +23,10 @@ use crate::common::mined::{fitted, provenance};
 
 /// Valid inputs and what the next steps need beside them.
 pub struct Seeds {
-    /// tracks, tracksMeta, recordingMeta.
     pub recording: [Vec<u8>; 3],
     pub loaded: Recording,
     /// A few of each category.
     pub scenarios: Vec<Scenario>,
-    /// Of each reader, by its name.
     pub files: BTreeMap<&'static str, Vec<Vec<u8>>>,
     pub profile: Profile,
     /// The density that proposals and parts belong to.
@@ -39,7 +37,6 @@ fn first_of(scenarios: &[Scenario], category: Category, n: usize) -> Vec<Scenari
     scenarios.iter().filter(|s| s.category == category && s.kept).take(n).cloned().collect()
 }
 
-/// What a writer leaves in a file.
 fn written(write: impl FnOnce(&Path)) -> Vec<u8> {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("file.json");
@@ -47,7 +44,6 @@ fn written(write: impl FnOnce(&Path)) -> Vec<u8> {
     std::fs::read(path).unwrap()
 }
 
-/// The file of a part of one segment.
 fn part<T: MergeableCounts>(units: Range<u64>, segment: T) -> Vec<u8> {
     let (run_sha256, lanes_redone_and_rechecked) = ("00".to_owned(), [0; 2]);
     let part = Part { run_sha256, units, lanes_redone_and_rechecked, segments: vec![segment] };

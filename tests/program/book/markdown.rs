@@ -3,15 +3,11 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// A Markdown file.
 pub struct Document {
-    /// From the crate's root.
     pub path: String,
-    /// All of it.
     pub text: String,
 }
 
-/// A fenced block.
 pub struct Block<'a> {
     /// Line of its first line of content, from 1.
     pub line: usize,
@@ -19,15 +15,11 @@ pub struct Block<'a> {
     pub language: &'a str,
     /// What follows it.
     pub attributes: &'a str,
-    /// Its lines.
     pub content: String,
 }
 
-/// A link of the prose.
 pub struct Link {
-    /// From 1.
     pub line: usize,
-    /// As it is written.
     pub target: String,
 }
 
@@ -37,7 +29,6 @@ impl Document {
         Document { path: path.to_owned(), text }
     }
 
-    /// The fenced blocks, in order.
     pub fn blocks(&self) -> impl Iterator<Item = Block<'_>> {
         let mut blocks = Vec::new();
         let mut lines = self.text.lines().enumerate();

@@ -2,13 +2,10 @@
 
 use super::markdown::Document;
 
-/// A command line of the program.
 pub struct Called {
-    /// `study`, …
     pub verb: String,
     /// The verb of a verb: `show` of `config show`.
     pub inner: Option<String>,
-    /// `--out`, `-q`, …
     pub flags: Vec<String>,
 }
 

@@ -1,5 +1,4 @@
-//! Who computes fails: a worker panics, a device is lost. What the journal holds is whole, and what is missing is
-//! computed by whoever comes next.
+//! Who computes fails: a worker panics, a device is lost. What is missing is computed by whoever comes next.
 
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -16,7 +15,6 @@ use lanesweep::{Error, Result};
 enum Failure {
     /// In a task of the thread pool, as a defect in a lane would.
     Panic,
-    /// As a driver reports it.
     DeviceLost,
 }
 

@@ -7,7 +7,6 @@ const CHANGING_MPS: f64 = 0.1;
 /// A vehicle that enters a lane this much or less before the next one cuts in, s.
 const CUT_IN_WITHIN_S: f64 = 4.0;
 
-/// What was counted. Series are unsorted.
 #[derive(Debug, Default)]
 pub struct Traffic {
     pub rows: usize,
@@ -171,12 +170,10 @@ pub fn mode(values: &[f64], kernel: f64) -> f64 {
     places.map(|x| (density(x), x)).max_by(|a, b| a.0.total_cmp(&b.0)).map_or(f64::NAN, |(_, x)| x)
 }
 
-/// Share of the values that fulfil a condition.
 pub fn share(values: &[f64], condition: impl Fn(f64) -> bool) -> f64 {
     values.iter().filter(|v| condition(**v)).count() as f64 / values.len() as f64
 }
 
-/// Mean.
 pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
