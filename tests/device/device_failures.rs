@@ -65,6 +65,11 @@ fn a_device_that_is_lost_has_no_memory_or_does_not_answer_in_time_leaves_complet
         // A lost one stays lost, and says so.
         assert!(what != "lost" || matches!(gpu.prepare(&plan).err(), Some(Error::Device { .. })));
     }
+    // Without a stand-in the failure is the user's to know.
+    let gpu = lost(0).unwrap();
+    let error = Executor::new(&gpu).sweep(&plan, 0..plan.unit_count(), Wanted::Verdicts, |_| Ok(())).unwrap_err();
+    assert!(matches!(&error, Error::Device { .. }), "{error}");
+    assert!(error.help().unwrap().contains("option `backend = cpu`"));
 }
 
 #[test]
@@ -98,15 +103,6 @@ fn lanes_of_more_steps_than_a_device_runs_are_computed_all_the_same() {
     let (verdicts, summary) = swept(&plan, &gpu);
     assert!(verdicts == expected(&plan));
     assert!(!gpu.card().name.starts_with("llvmpipe") || summary.redone_lanes > 0, "{summary:?}");
-}
-
-#[test]
-fn without_a_stand_in_the_failure_is_the_users_to_know() {
-    let plan = plan();
-    let Some(gpu) = tampered(GpuOptions::default(), lost_at(0)) else { return };
-    let error = Executor::new(&gpu).sweep(&plan, 0..plan.unit_count(), Wanted::Verdicts, |_| Ok(())).unwrap_err();
-    assert!(matches!(&error, Error::Device { .. }), "{error}");
-    assert!(error.help().unwrap().contains("option `backend = cpu`"));
 }
 
 #[test]

@@ -40,7 +40,8 @@ fn this_machine_runs_what_it_says_and_refuses_the_rest() {
 }
 
 #[test]
-fn random_lanes_and_lanes_on_thresholds_are_equal_under_every_profile() {
+fn a_small_study_random_lanes_and_lanes_on_thresholds_are_equal_under_every_profile() {
+    assert_equal("study", &small_study());
     for name in Profile::names() {
         let profile = Profile::load(name).unwrap();
         assert_equal(name, &random(&profile, 500));
@@ -55,11 +56,6 @@ fn lanes_are_equal_under_every_form_of_every_option_and_at_other_time_steps() {
         assert_equal(&what, &random(&profile, 50));
         assert_equal(&what, &thresholds(&profile, 1));
     }
-}
-
-#[test]
-fn every_word_of_a_small_study_is_equal() {
-    assert_equal("study", &small_study());
 }
 
 /// More headways than lanes wait at once, and numbers of them around those that a batch has: at the usual cap, and at

@@ -166,10 +166,6 @@ fn sides(
 /// Units of each threshold; each has four headways.
 const UNITS: u64 = 24;
 
-fn units_of(plan: &LanePlan, block: usize, threshold: Threshold) -> impl Iterator<Item = u64> {
-    (0..plan.blocks[block].units.len()).filter(move |&unit| Threshold::of_unit(unit) == threshold)
-}
-
 #[test]
 fn lanes_sit_exactly_on_each_threshold_with_a_neighbour_on_either_side() {
     for name in ["paper", "jrc-2021", "un-r157"] {
@@ -177,9 +173,8 @@ fn lanes_sit_exactly_on_each_threshold_with_a_neighbour_on_either_side() {
         for block in 0..plan.blocks.len() {
             for threshold in Threshold::ALL {
                 let (mut on, mut between, mut in_time) = (0, 0, false);
-                for (unit, headway) in
-                    units_of(&plan, block, threshold).flat_map(|u| (0..plan.headways.len()).map(move |h| (u, h)))
-                {
+                let units = (0..plan.blocks[block].units.len()).filter(|&unit| Threshold::of_unit(unit) == threshold);
+                for (unit, headway) in units.flat_map(|unit| (0..plan.headways.len()).map(move |h| (unit, h))) {
                     // Per side, per vehicle.
                     let seen = [0, 1, 2].map(|side| {
                         let case = plan.case(block, unit, side);

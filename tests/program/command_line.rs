@@ -65,8 +65,6 @@ fn help_names_every_verb_and_every_exit_code() {
     }
 }
 
-const CASE: &str = "simulate --category cut-in --ego-speed 30m/s --speed 20m/s --lateral-speed 1.5 --models Reg157";
-
 #[cfg(unix)]
 fn limited(limit: &str, args: &str) -> Output {
     let script = format!("ulimit {limit}; exec \"$0\" {args}");
@@ -84,7 +82,8 @@ fn an_address_space_that_is_too_small_is_told_with_its_limit_and_is_no_crash() {
     let mut limits = (20_000..400_000).step_by(1000).skip_while(|kib| !is_loaded(kib)).step_by(2).take(25);
     let (mut done, mut refused) = (0, 0);
     assert!(limits.all(|kib| {
-        let output = limited(&format!("-v {kib}"), &format!("{CASE} --thw 1 --threads 4096"));
+        let case = "--category cut-in --ego-speed 30m/s --speed 20m/s --lateral-speed 1.5 --models Reg157 --thw 1";
+        let output = limited(&format!("-v {kib}"), &format!("simulate {case} --threads 4096"));
         let said = unbroken(&output.stderr);
         match output.status.code() {
             Some(0) => done += 1,

@@ -1,27 +1,17 @@
 //! Every example that `--help` ends with, run as it stands there, in one folder; only sizes are smaller.
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output};
-use std::sync::OnceLock;
 
 use crate::common::program::PROGRAM;
 use crate::common::skipped;
 use crate::program::command_line::verbs_of;
 
-fn fewer_recordings() -> &'static Path {
-    static FILE: OnceLock<PathBuf> = OnceLock::new();
-    FILE.get_or_init(|| {
-        let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("fewer-recordings.toml");
-        std::fs::write(&file, "[generator]\nrecordings = 12\n").unwrap();
-        file
-    })
-}
-
 fn run(dir: &Path, line: &str) -> Output {
     let mut command = Command::new(PROGRAM);
     // Help in one line per example.
-    command.current_dir(dir).env("COLUMNS", "1000").env("LANESWEEP_CONFIG", fewer_recordings());
+    command.current_dir(dir).env("COLUMNS", "1000").env("LANESWEEP_CONFIG", "fewer.toml");
     command.args(line.split_whitespace().skip(1)).output().unwrap()
 }
 
@@ -85,6 +75,7 @@ fn tracks() -> String {
 fn every_example_of_the_help_runs() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
+    std::fs::write(dir.join("fewer.toml"), "[generator]\nrecordings = 12\n").unwrap();
     let mut ran = BTreeSet::new();
     for verb in verbs() {
         for example in examples(dir, &verb) {

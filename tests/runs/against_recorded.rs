@@ -76,13 +76,23 @@ fn rates_that_are_sound_do_not_exclude_each_other() {
     }
 }
 
+/// A density that draws its headway is compared with S from its recorded gaps; under a condition nothing is compared.
 #[test]
-fn a_rate_that_nothing_is_compared_with_is_not_sound() {
+fn no_rate_is_sound_that_is_compared_with_nothing() {
     let mut without = density("2");
     without.scenarios.clear();
     for row in rows(&sample(without, Estimator::Crude, Headway::paper())) {
         assert!(row.recorded.is_none() && !is_sound(&row), "{row:?}");
         assert!(row.estimate.trust.warnings.contains(&Warning::NotCompared));
+    }
+    let mut options = SampleOptions::new(Estimator::Crude, 4000, SampleHeadways::Sampled);
+    options.models = vec![ModelId::Cchdm, ModelId::Fsm];
+    let profile = Profile::load("paper").unwrap();
+    let drawn = rows(&Sample::plan(density_of("2", true), &profile, &options).unwrap());
+    for row in &drawn {
+        let ratios = row.recorded.expect("S starts from its recorded gaps");
+        let agrees = ratios.replayed.agrees() && ratios.sampled.unwrap().agrees();
+        assert!(agrees || !is_sound(row), "{row:?}");
     }
 }
 
@@ -104,18 +114,4 @@ fn a_density_file_holds_its_scenarios_and_refuses_others() {
     assert!(other.contains("is no cut-in") || other.contains("is no Cut-in"), "{other}");
     let empty = refused(|scenarios| scenarios[0].target.v.clear());
     assert!(empty.contains("target.v"), "{empty}");
-}
-
-/// A density that draws its headway is compared with S from its recorded gaps; under a condition nothing is compared.
-#[test]
-fn no_rate_is_sound_that_is_compared_with_nothing() {
-    let mut options = SampleOptions::new(Estimator::Crude, 4000, SampleHeadways::Sampled);
-    options.models = vec![ModelId::Cchdm, ModelId::Fsm];
-    let profile = Profile::load("paper").unwrap();
-    let drawn = rows(&Sample::plan(density_of("2", true), &profile, &options).unwrap());
-    for row in &drawn {
-        let ratios = row.recorded.expect("S starts from its recorded gaps");
-        let agrees = ratios.replayed.agrees() && ratios.sampled.unwrap().agrees();
-        assert!(agrees || !is_sound(row), "{row:?}");
-    }
 }

@@ -60,14 +60,8 @@ fn what_is_strange_about_s_prime_is_said_and_what_cannot_be_one_is_refused() {
             format!("{row}\n")
         });
         std::fs::write(dir.join("own.jsonl"), changed.collect::<String>()).unwrap();
-        said(
-            dir,
-            &format!(
-                "{STUDY} --categories {} --external own.jsonl",
-                rows[0]["category"].as_str().unwrap().replace('_', "-")
-            ),
-        )
-        .1
+        let category = rows[0]["category"].as_str().unwrap().replace('_', "-");
+        said(dir, &format!("{STUDY} --categories {category} --external own.jsonl")).1
     };
     type Change<'a> = &'a dyn Fn(&mut Value);
     let cases: [(&[Value], Change, &str); 8] = [

@@ -51,13 +51,9 @@ fn a_scenario_without_a_recorded_gap_is_named_and_a_mixture_of_headways_is_refus
     let mixed = StudyOptions { headways: vec![Headway::Observed, Headway::ThwS(1.0)], ..StudyOptions::default() };
     let error = plan_study(scenarios_of(1), &paper, &mixed).err().unwrap().to_string();
     assert!(error.contains("cannot be combined"), "{error}");
-}
-
-#[test]
-fn a_density_without_headways_cannot_draw_observed_ones() {
+    // A density without headways cannot draw observed ones.
     let density = density_of(2, Category::CutIn, "2", false);
     let options = SampleOptions::new(Estimator::Crude, 100, SampleHeadways::Each(vec![Headway::Observed]));
-    let paper = Profile::load("paper").unwrap();
     let error = plan_samples(&density, &paper, &options).err().unwrap();
     assert!(error.help().unwrap_or_default().contains("with_thw"), "{error}");
 }

@@ -21,6 +21,10 @@ impl Found {
     }
 }
 
+fn named<'f>(all: &'f [Found], name: &str) -> Option<&'f Found> {
+    all.iter().find(|found| found.attributes.get("name").is_some_and(|own| own == name))
+}
+
 /// Every element in order; the document must be well-formed, and no text stands outside of attributes.
 fn elements(text: &str) -> Vec<Found> {
     let (mut above, mut found): (Vec<&str>, Vec<Found>) = (Vec::new(), Vec::new());
@@ -198,8 +202,7 @@ fn a_cut_out_whose_other_vehicles_overlap_says_so_in_its_file() {
                 && (a.2 - b.2).abs() < (other.width_m + ahead.width_m) / 2.0
         });
         let time_s = overlap.map(|(at, _)| at.0);
-        let of_property =
-            all.iter().find(|e| e.attributes.get("name").is_some_and(|n| n == "lanesweep.others_overlap_s"));
+        let of_property = named(&all, "lanesweep.others_overlap_s");
         assert_eq!(of_property.map(|e| e.number("value")), time_s);
         assert_eq!(time_s.is_some(), first_s.is_some());
         let description = &all.iter().find(|e| e.path.ends_with("/FileHeader")).unwrap().attributes["description"];
@@ -243,8 +246,7 @@ fn lanes_of_a_study_and_of_a_sampling_run_are_those_of_simulate_in_binary32() {
             let text = std::fs::read_to_string(root.join("x").join(file)).unwrap();
             compare(&text, &csv);
             let (_, all) = played(&text);
-            let named = |found: &&Found| found.attributes.get("name").is_some_and(|n| n == "lanesweep.lane");
-            assert_eq!(all.iter().find(named).unwrap().attributes["value"], lane);
+            assert_eq!(named(&all, "lanesweep.lane").unwrap().attributes["value"], lane);
             let road = std::fs::read_to_string(root.join("x").join(file.replace(".xosc", ".xodr"))).unwrap();
             assert!(elements(&road).iter().any(|e| e.path.ends_with("/line")));
         }
@@ -289,7 +291,7 @@ fn an_ego_of_the_users_own_has_a_start_and_no_path_and_the_others_go_on() {
         assert!(((b.1 - a.1) / (b.0 - a.0) - 20.0).abs() < 1e-6 && b.2 == 0.0);
         let stop = all.iter().rev().find(|e| e.path.ends_with("SimulationTimeCondition")).unwrap();
         assert_eq!(stop.number("value"), b.0);
-        let declared = all.iter().find(|e| e.attributes.get("name").is_some_and(|n| n == "ego_speed_mps")).unwrap();
+        let declared = named(&all, "ego_speed_mps").unwrap();
         assert_eq!(declared.number("value"), 30.0);
         assert!(text.contains("<AbsoluteTargetSpeed value=\"$ego_speed_mps\"/>"));
     }
@@ -299,19 +301,14 @@ fn an_ego_of_the_users_own_has_a_start_and_no_path_and_the_others_go_on() {
         2,
         "add --ego external",
     );
-}
-
-/// Ten digits of 20 km/h gave another first gap and another instant of braking.
-#[test]
-fn the_declared_speed_of_an_ego_of_the_users_own_is_the_cases_to_the_bit() {
-    let dir = tempfile::tempdir().unwrap();
+    // The declared speed is the case's to the bit: ten digits of 20 km/h gave another first gap and another braking.
     for kmh in [7.0, 20.0, 33.3, 50.0, 108.0] {
         let ego = format!("{kmh}km/h");
         let case = ["--category", "cut-in", "--models", "FSM", "--ego-speed", &ego, "--speed", "1m/s", "--gap", "9"];
         let flags = ["simulate", "--xosc", "x", "--ego", "external", "--lateral-speed", "1"];
         good(dir.path(), &[&flags[..], &case].concat());
         let (_, all) = played(&only_scenario(&dir.path().join("x")));
-        let declared = all.iter().find(|e| e.attributes.get("name").is_some_and(|n| n == "ego_speed_mps")).unwrap();
+        let declared = named(&all, "ego_speed_mps").unwrap();
         assert_eq!(declared.number("value") * 0.04, kmh / 3.6 * 0.04, "{ego}");
     }
 }
@@ -362,7 +359,7 @@ fn odd_names_are_escaped_and_read_back_and_make_plain_file_names() {
         let lane = format!("{id}/S/1.2s/FSM");
         good(dir.path(), &["simulate", "--xosc", "x", "--scenarios", "s.jsonl", "--lane", &lane]);
         let (_, all) = played(&only_scenario(&dir.path().join("x")));
-        let property = all.iter().find(|e| e.attributes.get("name").is_some_and(|n| n == "lanesweep.lane")).unwrap();
+        let property = named(&all, "lanesweep.lane").unwrap();
         assert_eq!(property.attributes["value"], format!("{read}/S/1.2s/FSM"));
         for entry in std::fs::read_dir(dir.path().join("x")).unwrap() {
             let name = entry.unwrap().file_name().into_string().unwrap();

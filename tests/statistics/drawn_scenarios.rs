@@ -73,10 +73,7 @@ fn densities_of_one_side_lose_few_draws_and_those_of_both_sides_many() {
         assert!(both > 2.0 * one && both > 0.02, "{}: {both} and {one}", id.name());
     }
     assert_eq!(FitOptions::default().parameterization, options(SvdLateral::Mirrored));
-}
-
-#[test]
-fn refused_draws_are_counted_by_the_bound_that_they_break() {
+    // Refused draws are counted by the bound that they break.
     let density = density(Parameterization::find(Category::CutOut, "g").unwrap(), options(SvdLateral::Signed));
     let valid = &density.valid;
     assert_eq!(valid.refused.iter().map(|refused| refused.draws).sum::<u64>(), valid.draws - valid.valid);

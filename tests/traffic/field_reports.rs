@@ -203,20 +203,10 @@ fn a_road_with_a_ramp_has_the_same_lanes() {
     let lane = |[x, y]: [f64; 2]| match (x < 100.0, y) {
         (true, ..0.0) => "ramp_0",
         (false, ..0.0) => "e2_0",
-        (_, ..3.5) => {
-            if x < 100.0 {
-                "e1_0"
-            } else {
-                "e2_1"
-            }
-        }
-        _ => {
-            if x < 100.0 {
-                "e1_1"
-            } else {
-                "e2_2"
-            }
-        }
+        (true, ..3.5) => "e1_0",
+        (false, ..3.5) => "e2_1",
+        (true, _) => "e1_1",
+        (false, _) => "e2_2",
     };
     let found = mined(&table(&all, 10.0, &|k| format!("{},", k as f64 / 10.0), &lane));
     let [one] = &found.scenarios[..] else { panic!("{:?}", found.scenarios) };

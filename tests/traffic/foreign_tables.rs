@@ -61,12 +61,7 @@ fn every_file_of_a_folder_is_read_or_named() {
     write("settings.toml", "a = 1\n");
     write("classes.csv", "class,meaning\n1,car\n");
     assert_eq!(read_and_named(dir.path()), (1, ["b.csv", "c.csv.gz", "d.csv.zip"].map(str::to_owned).to_vec()));
-}
-
-/// SUMO writes no sizes, so a table with the usual names of sizes is that of another program.
-#[test]
-fn a_table_with_sizes_is_not_taken_for_one_without() {
-    let dir = tempfile::tempdir().unwrap();
+    // SUMO writes no sizes, so a table with the usual names of sizes is that of another program.
     let path = dir.path().join("table.csv");
     for (header, preset) in [
         ("id,time,x,y,speed,lane,angle,type", "sumo-fcd"),

@@ -57,6 +57,15 @@ fn one_recording_alone_is_the_one_among_all_and_another_seed_gives_another() {
     assert_ne!(generate_one(&other, 0).unwrap(), all[0]);
     // The number of recordings does not reach into any of them.
     assert_eq!(generate_one(&GeneratorOptions { recordings: 1, ..options }, 0).unwrap(), all[0]);
+    // Another frame rate gives the same kind of traffic.
+    for frame_rate_hz in [10.0, 30.0] {
+        let options =
+            GeneratorOptions { frame_rate_hz, recordings: 1, duration_s: 60.0, ..GeneratorOptions::default() };
+        let recording = generate_one(&options, 0).unwrap();
+        let last = recording.tracks.iter().map(Track::last_frame).max().unwrap();
+        assert_eq!((recording.frame_rate_hz, last as f64), (frame_rate_hz, 60.0 * frame_rate_hz));
+        assert!((60..220).contains(&recording.tracks.len()), "{} vehicles in a minute", recording.tracks.len());
+    }
 }
 
 #[test]
@@ -141,18 +150,5 @@ fn vehicles_appear_once_pass_through_the_window_of_the_camera_and_keep_in_the_la
                 assert_eq!(road.lane_at(*d), Some(usize::from(*lane)));
             }
         }
-    }
-}
-
-#[test]
-fn another_frame_rate_gives_the_same_kind_of_traffic() {
-    for frame_rate_hz in [10.0, 30.0] {
-        let options =
-            GeneratorOptions { frame_rate_hz, recordings: 1, duration_s: 60.0, ..GeneratorOptions::default() };
-        let recording = generate_one(&options, 0).unwrap();
-        assert_eq!(recording.frame_rate_hz, frame_rate_hz);
-        let last = recording.tracks.iter().map(Track::last_frame).max().unwrap();
-        assert_eq!(last as f64, 60.0 * frame_rate_hz);
-        assert!((60..220).contains(&recording.tracks.len()), "{} vehicles in a minute", recording.tracks.len());
     }
 }

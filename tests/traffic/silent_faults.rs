@@ -157,6 +157,17 @@ fn two_places_in_one_table_are_told_or_parted() {
     assert!(about.recording == "own-north" && !says(&about, "no vehicle drives between"), "{:?}", about.findings);
     let about = understood(&table.without(&["site"]), &|_| ()).unwrap();
     assert!(says(&about, "no vehicle drives between"), "{:?}", about.findings);
+    // One after the other.
+    let recording = generated();
+    let middle = recording.tracks.iter().map(|of| of.first_frame).max().unwrap() / 2;
+    let late = recording.tracks.iter().filter(|of| of.first_frame > middle).map(|of| of.id.to_string());
+    let late: Vec<String> = late.collect();
+    for (by_m, is_told) in [(1.5, true), (6.0, true), (0.1, false)] {
+        let mut table = Plain::of(&recording, 5);
+        table.map("y", |y, row| if late.contains(&row[0]) { y + by_m } else { y });
+        let about = understood(&table, &|_| ()).unwrap();
+        assert_eq!(says(&about, "drive elsewhere across the road"), is_told, "{by_m}: {:?}", about.findings);
+    }
 }
 
 #[test]
@@ -245,18 +256,4 @@ fn a_part_of_a_recording_under_other_numbers_counts_once() {
     // Parts that have nothing in common.
     let (_, problems) = driven(&[clip(&whole, "01", [1, frames / 2]), clip(&whole, "02", [frames / 2, frames])]);
     assert_eq!(problems, [""; 0]);
-}
-
-#[test]
-fn two_places_one_after_the_other_in_one_recording_are_told() {
-    let recording = generated();
-    let middle = recording.tracks.iter().map(|of| of.first_frame).max().unwrap() / 2;
-    let late = recording.tracks.iter().filter(|of| of.first_frame > middle).map(|of| of.id.to_string());
-    let late: Vec<String> = late.collect();
-    for (by_m, is_told) in [(1.5, true), (6.0, true), (0.1, false)] {
-        let mut table = Plain::of(&recording, 5);
-        table.map("y", |y, row| if late.contains(&row[0]) { y + by_m } else { y });
-        let about = understood(&table, &|_| ()).unwrap();
-        assert_eq!(says(&about, "drive elsewhere across the road"), is_told, "{by_m}: {:?}", about.findings);
-    }
 }

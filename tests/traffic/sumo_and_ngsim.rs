@@ -89,7 +89,7 @@ fn the_gap_behind_a_truck_of_sumo_is_measured_from_its_front_bumper() {
 }
 
 #[test]
-fn sumos_table_without_sizes_is_refused_with_what_makes_them() {
+fn sumos_table_without_sizes_is_refused_and_its_persons_and_empty_steps_are_no_vehicles() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("fcd.csv");
     let with = fcd(&CUT_IN, 4.0);
@@ -103,13 +103,8 @@ fn sumos_table_without_sizes_is_refused_with_what_makes_them() {
     fs::write(&path, with.lines().map(some).collect::<Vec<_>>().join("\n")).unwrap();
     let error = load(&path).unwrap_err();
     assert!(error.to_string().contains("1 vehicles have no size"), "{error}");
-}
-
-#[test]
-fn persons_and_steps_without_vehicles_are_no_vehicles() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("fcd.csv");
-    let mut text = fcd(&CUT_IN, 4.0);
+    // Persons and steps without vehicles are no vehicles.
+    let mut text = with;
     for time in times(12) {
         let _ = writeln!(text, "{time:.2};p0;{:.2};-2.88;90.00;DEFAULT_PEDTYPE;1.30;;;", 1.3 * time);
     }
