@@ -148,8 +148,15 @@ impl RunFolder {
             let entries = entries.map_err(|e| if e.kind() == ErrorKind::NotFound { vanished() } else { e });
             let entries = entries.map_err(|e| Error::io(&self.dir, "read", e))?;
             let names = entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned());
-            // Hidden files are ours.
-            let is_work = |name: &String| name.starts_with('.') || WORK.iter().any(|end| name.ends_with(end));
+            // Hidden files are ours; so is a folder of tables or figures with nothing else.
+            let is_hidden = |name: &str| name.starts_with('.');
+            let holds_hidden = |name: &str| {
+                let entries = || std::fs::read_dir(self.dir.join(name)).into_iter().flatten().flatten();
+                INNER.iter().any(|inner| inner.trim_end_matches('/') == name)
+                    && entries().all(|entry| is_hidden(&entry.file_name().to_string_lossy()))
+            };
+            let is_work =
+                |name: &String| is_hidden(name) || holds_hidden(name) || WORK.iter().any(|end| name.ends_with(end));
             return match names.filter(|name| !is_work(name)).min() {
                 Some(name) if !self.dir.join(PLAN).exists() => {
                     Err(self.refusal(&format!("it holds {name} and no {LIST}")))
