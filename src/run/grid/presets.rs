@@ -125,7 +125,7 @@ const R157: [GridRow; 6] = [
     ("cut_in_to_60", Category::CutIn, "gap_m=1..60/1", "lateral_speed_mps=0.1..1.8/0.1", &["ego_speed_kmh=20..60/10", "other_speed_kmh=10..50/10"], &[]),
     ("cut_in_to_130", Category::CutIn, "gap_m=2..120/2", "lateral_speed_mps=0.1..1.8/0.1", &["ego_speed_kmh=70..130/20", "other_speed_kmh=10..110/20"], &[]),
     ("cut_out_to_60", Category::CutOut, "ahead_gap_m=2..60/2", "lateral_speed_mps=0.1..1.8/0.1", &["ego_speed_kmh=10..60/10"], &["thw_s=2", "ahead_speed_kmh=0"]),
-    ("cut_out_to_130", Category::CutOut, "ahead_gap_m=2..120/2", "lateral_speed_mps=0.1..1.8/0.1", &["ego_speed_kmh=70..130/10"], &["thw_s=2", "ahead_speed_kmh=0"]),
+    ("cut_out_to_130", Category::CutOut, "ahead_gap_m=2..120/2", "lateral_speed_mps=0.1..1.8/0.1", &["ego_speed_kmh=70..130/20"], &["thw_s=2", "ahead_speed_kmh=0"]),
     ("lvd_to_60", Category::Lvd, "deceleration_mps2=0.2..10/0.2", "ego_speed_kmh=10..60/2", &[], &["thw_s=2"]),
     ("lvd_to_130", Category::Lvd, "deceleration_mps2=0.2..10/0.2", "ego_speed_kmh=62..130/4", &[], &["thw_s=2"]),
 ];
