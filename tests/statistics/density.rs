@@ -381,7 +381,7 @@ fn white_space_may_change_but_lengths_must_fit() {
         ("/kernels/3", serde_json::json!([1.0]), "kernel 4"),
         ("/scale", serde_json::json!([1.0, 1.0]), "2 numbers"),
         ("/scale/1", serde_json::json!(-1.0), "`c2` is -1e0 1; expected 1e-9"),
-        ("/bandwidth/value", serde_json::json!(0.0), "bandwidth 0"),
+        ("/bandwidth/value", serde_json::json!(0.0), "0e0; expected 1e-9 to 1000"),
         ("/bandwidth/value", serde_json::json!(1e308), "1e308; expected 1e-9 to 1000"),
         ("/scale/1", serde_json::json!(1e-300), "`c2` is 1e-300 1; expected 1e-9 to 1000000 1"),
         ("/kernels/2/0", serde_json::json!(1e308), "kernel 3: `c1` is 1e308 1; expected −1000000 to 1000000 1"),
