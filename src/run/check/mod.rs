@@ -295,7 +295,7 @@ impl Check {
         let (mut boundaries, mut finer, mut by_rule) = Default::default();
         if with_boundaries {
             boundaries = boundary::boundaries(&self.subject, profile, &budget)?;
-            finer = Some(FinerStep::run(&self.subject, profile, &self.models, &budget)?);
+            finer = Some(FinerStep::run(self, profile, &budget)?);
             by_rule = self.by_rule(profile, (&changed, &touching), &budget)?;
         }
         Ok(Judgement {
