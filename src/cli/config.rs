@@ -31,36 +31,42 @@ pub(super) struct Config {
 
 #[derive(Debug, Subcommand)]
 enum ConfigVerb {
-    Init(Init),
-    Show(Box<Show>),
-    Check(Check),
-    Schema(Schema),
+    /// Write the commented default configuration: every key with its default, unit, range and source; or a shipped profile
+    #[command(after_help = "Examples:\n  lanesweep config init\n  lanesweep config init un-r157.toml")]
+    Init {
+        /// File to write; `-` prints it; under the name of a shipped profile it is that profile
+        #[arg(value_name = "FILE", default_value = DEFAULT_FILE_NAME, help_heading = "Data")]
+        file: PathBuf,
+    },
+    /// Show every effective value and its source
+    ///
+    /// After all layers: defaults, file, flags. With --format toml it prints a file that sets the same, for another machine
+    /// or an appendix.
+    #[command(after_help = "Example:\n  lanesweep config show --config mining.leader_max_thw_s=2.5 --backend cpu")]
+    Show {
+        /// How to print
+        #[arg(long, value_enum, default_value_t, help_heading = "Output")]
+        format: ShowFormat,
+        /// Only values that differ from the default
+        #[arg(long, help_heading = "Output")]
+        changed: bool,
+    },
+    /// Check a configuration file: every key known, every value of its type and in its range
+    #[command(after_help = "Example:\n  lanesweep config check lanesweep.toml")]
+    Check {
+        /// The file
+        #[arg(value_name = "FILE", help_heading = "Data")]
+        file: PathBuf,
+    },
+    /// Print the JSON Schema of a configuration file or a profile, for editors
+    #[command(after_help = "Example:\n  lanesweep config schema > lanesweep.schema.json")]
+    Schema {
+        /// Kind of file
+        #[arg(value_enum, default_value_t, help_heading = "Data")]
+        of: SchemaOf,
+    },
     Completions(Completions),
     Man(Man),
-}
-
-/// Write the commented default configuration: every key with its default, unit, range and source; or a shipped profile
-#[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  lanesweep config init\n  lanesweep config init un-r157.toml")]
-struct Init {
-    /// File to write; `-` prints it; under the name of a shipped profile it is that profile
-    #[arg(value_name = "FILE", default_value = DEFAULT_FILE_NAME, help_heading = "Data")]
-    file: PathBuf,
-}
-
-/// Show every effective value and its source
-///
-/// After all layers: defaults, file, flags. With --format toml it prints a file that sets the same, for another machine
-/// or an appendix.
-#[derive(Debug, Args)]
-#[command(after_help = "Example:\n  lanesweep config show --config mining.leader_max_thw_s=2.5 --backend cpu")]
-struct Show {
-    /// How to print
-    #[arg(long, value_enum, default_value_t, help_heading = "Output")]
-    format: ShowFormat,
-    /// Only values that differ from the default
-    #[arg(long, help_heading = "Output")]
-    changed: bool,
 }
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
@@ -72,24 +78,6 @@ enum ShowFormat {
     Json,
     /// A configuration file
     Toml,
-}
-
-/// Check a configuration file: every key known, every value of its type and in its range
-#[derive(Debug, Args)]
-#[command(after_help = "Example:\n  lanesweep config check lanesweep.toml")]
-struct Check {
-    /// The file
-    #[arg(value_name = "FILE", help_heading = "Data")]
-    file: PathBuf,
-}
-
-/// Print the JSON Schema of a configuration file or a profile, for editors
-#[derive(Debug, Args)]
-#[command(after_help = "Example:\n  lanesweep config schema > lanesweep.schema.json")]
-struct Schema {
-    /// Kind of file
-    #[arg(value_enum, default_value_t, help_heading = "Data")]
-    of: SchemaOf,
 }
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
@@ -104,75 +92,60 @@ enum SchemaOf {
 impl Config {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         match &self.verb {
-            ConfigVerb::Init(verb) => verb.run(),
-            ConfigVerb::Show(verb) => verb.run(configured),
-            ConfigVerb::Check(verb) => verb.run(),
-            ConfigVerb::Schema(verb) => verb.run(),
+            ConfigVerb::Init { file } => init(file),
+            ConfigVerb::Show { format, changed } => show(*format, *changed, configured),
+            ConfigVerb::Check { file } => check(file),
+            ConfigVerb::Schema { of: SchemaOf::Config } => console::answer(&format!("{:#}\n", settings_schema())),
+            ConfigVerb::Schema { of: SchemaOf::Profile } => console::answer(&format!("{:#}\n", profile_schema()?)),
             ConfigVerb::Completions(verb) => verb.run(),
             ConfigVerb::Man(verb) => verb.run(),
         }
     }
 }
 
-impl Init {
-    fn run(&self) -> Result<Output> {
-        if self.file == Path::new("-") {
-            return console::answer(DEFAULT_FILE);
-        }
-        if self.file.exists() {
-            let help = "choose another name, or move it away; `lanesweep config init -` prints the file";
-            return Err(Error::usage(Place::file(&self.file), "it exists already and is not overwritten", help));
-        }
-        let is_profile = |name: &str| self.file.file_stem().is_some_and(|stem| stem == name);
-        let profile = Profile::names().zip(Profile::files()).find(|(name, _)| is_profile(name));
-        let stem = self.file.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-        if let Some(near) = nearest(&stem, Profile::names(), 0.85).filter(|_| profile.is_none()) {
-            let help =
-                format!("did you mean `{near}.toml`, a copy of that profile? Else choose a name that is not like it");
-            return Err(Error::usage(Place::file(&self.file), "this is not the name of a profile", help));
-        }
-        let (flag, text) = profile.map_or(("config", DEFAULT_FILE), |(_, text)| ("profile", text));
-        write_atomically(&self.file, text.as_bytes())?;
-        let file = self.file.display().to_string();
-        console::answer(&format!("{file} written; use it with --{flag} {}\n", quoted_word(&file)))
+fn init(path: &Path) -> Result<Output> {
+    if path == Path::new("-") {
+        return console::answer(DEFAULT_FILE);
     }
+    if path.exists() {
+        let help = "choose another name, or move it away; `lanesweep config init -` prints the file";
+        return Err(Error::usage(Place::file(path), "it exists already and is not overwritten", help));
+    }
+    let is_profile = |name: &str| path.file_stem().is_some_and(|stem| stem == name);
+    let profile = Profile::names().zip(Profile::files()).find(|(name, _)| is_profile(name));
+    let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+    if let Some(near) = nearest(&stem, Profile::names(), 0.85).filter(|_| profile.is_none()) {
+        let help =
+            format!("did you mean `{near}.toml`, a copy of that profile? Else choose a name that is not like it");
+        return Err(Error::usage(Place::file(path), "this is not the name of a profile", help));
+    }
+    let (flag, text) = profile.map_or(("config", DEFAULT_FILE), |(_, text)| ("profile", text));
+    write_atomically(path, text.as_bytes())?;
+    let file = path.display().to_string();
+    console::answer(&format!("{file} written; use it with --{flag} {}\n", quoted_word(&file)))
 }
 
-impl Show {
-    fn run(&self, configured: &Configured) -> Result<Output> {
-        // Only the profile can check its own time step.
-        configured.profile()?;
-        configured.backend()?;
-        let shown: Vec<&Setting> = match self.changed {
-            true => configured.layers.given().collect(),
-            false => configured.layers.0.iter().collect(),
-        };
-        console::answer(&match self.format {
-            ShowFormat::Text => table(&shown),
-            ShowFormat::Json => json_list(&shown)?,
-            ShowFormat::Toml => toml_file(&shown),
-        })
-    }
+fn show(format: ShowFormat, is_changed: bool, configured: &Configured) -> Result<Output> {
+    // Only the profile can check its own time step.
+    configured.profile()?;
+    configured.backend()?;
+    let shown: Vec<&Setting> = match is_changed {
+        true => configured.layers.given().collect(),
+        false => configured.layers.0.iter().collect(),
+    };
+    console::answer(&match format {
+        ShowFormat::Text => table(&shown),
+        ShowFormat::Json => json_list(&shown)?,
+        ShowFormat::Toml => toml_file(&shown),
+    })
 }
 
-impl Check {
-    fn run(&self) -> Result<Output> {
-        let mut layers = Layers::defaults();
-        layers.read_file(&self.file)?;
-        layers.settings()?;
-        let count = layers.given().count();
-        console::answer(&format!("{}: {count} keys set, all of them known and in range\n", self.file.display()))
-    }
-}
-
-impl Schema {
-    fn run(&self) -> Result<Output> {
-        let schema = match self.of {
-            SchemaOf::Config => settings_schema(),
-            SchemaOf::Profile => profile_schema()?,
-        };
-        console::answer(&format!("{schema:#}\n"))
-    }
+fn check(path: &Path) -> Result<Output> {
+    let mut layers = Layers::defaults();
+    layers.read_file(path)?;
+    layers.settings()?;
+    let count = layers.given().count();
+    console::answer(&format!("{}: {count} keys set, all of them known and in range\n", path.display()))
 }
 
 fn value(setting: &Setting) -> String {

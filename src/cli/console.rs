@@ -237,8 +237,7 @@ fn unbroken(text: &str) -> String {
 
 /// Prints an error with its help on stderr.
 pub(super) fn complain(error: &Error) {
-    if is_captured() {
-        capture(Level::ERROR, &format!("{error}; {}", error.help().unwrap_or_default()));
+    if capture(Level::ERROR, &format!("{error}; {}", error.help().unwrap_or_default())) {
         return;
     }
     let part = |text: &str| unbroken(&shown(text));

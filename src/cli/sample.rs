@@ -79,8 +79,7 @@ impl Sample {
     pub(super) fn is_refined(&self) -> bool {
         let needs_crude = self.rows.is_some()
             || self.settings.time_limit_s.is_some()
-            || self.shards.shard.is_some()
-            || self.shards.plan_only
+            || self.shards.is_split()
             || self.shards.plan.is_some();
         self.settings.estimator == EstimatorKind::Auto && self.settings.half_width.is_some() && !needs_crude
     }

@@ -105,8 +105,7 @@ impl Sample {
         if settings.estimator == EstimatorKind::Is && settings.time_limit_s.is_some() {
             return Err(only_crude("time_limit"));
         }
-        let is_split = self.shards.shard.is_some() || self.shards.plan_only;
-        if is_split && is_crude && (settings.half_width.is_some() || settings.time_limit_s.is_some()) {
+        if self.shards.is_split() && is_crude && (settings.half_width.is_some() || settings.time_limit_s.is_some()) {
             let problem = "a part of a run cannot evaluate a stop rule of the whole run";
             return Err(Error::usage(
                 Place::option("shard"),

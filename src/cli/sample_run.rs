@@ -15,7 +15,6 @@ use lanesweep_run::sampling::{self, FailingLane, SampleKind, SampleOptions, Samp
 use lanesweep_stats::density::read_density;
 use lanesweep_stats::estimate::{Search, StopRule};
 use lanesweep_support::atomic_file::StagedFile;
-use lanesweep_support::files::check_folder;
 use lanesweep_support::readable::{count, counted, duration};
 use lanesweep_support::run_folder::RunFolder;
 use lanesweep_support::table::TableWriter;
@@ -72,10 +71,7 @@ impl Sample {
             return Err(Error::usage(Place::option("density"), "there is none", help));
         };
         let density = read_density(density)?;
-        match self.shards.plan_only || self.shards.shard.is_some() {
-            true => check_folder(&self.out)?,
-            false => drop(RunFolder::open(&self.out, sampling::ESTIMATE_RECORD)?),
-        }
+        self.shards.check_folder(&self.out, sampling::ESTIMATE_RECORD)?;
         let profile = configured.profile()?;
         let options = self.options(&density)?;
         self.guard_tables()?;
@@ -95,7 +91,7 @@ impl Sample {
     /// Executes a plan, whole or a shard of it.
     fn run_sample(&self, sample: sampling::Sample, opened: &OpenBackend, configured: &Configured) -> Result<Output> {
         let executor = &opened.executor().with_recheck(sample.options.seed);
-        let is_split = self.shards.plan_only || self.shards.shard.is_some();
+        let is_split = self.shards.is_split();
         let sample = match sample.kind {
             SampleKind::Search(search) => {
                 let units = warn_of_long(&sample, &search);
@@ -119,7 +115,6 @@ impl Sample {
         }
         // Rows are written during the run, so a run with rows cannot resume.
         let Some(mut run) = sample.open(&self.out, self.shards.shard, self.rows.is_none())? else {
-            tracing::info!("this part exists already and is complete");
             return Ok(Exit::Ok.into());
         };
         let missing = run.missing()?;

@@ -61,13 +61,12 @@ impl Man {
         program.build();
         let mut pages = Vec::new();
         collect("lanesweep".to_owned(), &program, &mut pages);
-        let mut written = 0;
+        let written = pages.len();
         for (name, command) in pages {
             let mut page = Vec::new();
             let unwritten = |e: std::io::Error| Error::Internal(format!("a manual page cannot be made: {e}"));
             clap_mangen::Man::new(command).render(&mut page).map_err(unwritten)?;
             write_inside(&self.dir.join(format!("{name}.1")), |file| file.write_all(&page))?;
-            written += 1;
         }
         tracing::info!("{written} pages written to {}", self.dir.display());
         Ok(Exit::Ok.into())

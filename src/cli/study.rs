@@ -18,10 +18,9 @@ use lanesweep_report::lanes::{study_table, write_study_chunk};
 use lanesweep_report::study::StudyReport;
 use lanesweep_run::parts::{EachChunk, Job, PLAN_FILE, RUN_PLAN_FILE};
 use lanesweep_run::study::{self, ExternalReplay, ReferenceComparison, StudyOptions, StudyResult};
-use lanesweep_support::files::check_folder;
 use lanesweep_support::input_file;
 use lanesweep_support::readable;
-use lanesweep_support::run_folder::{Results, RunFolder};
+use lanesweep_support::run_folder::Results;
 use lanesweep_support::{Error, Place, Result};
 use lanesweep_traffic::Source;
 
@@ -84,10 +83,7 @@ pub(super) struct Study {
 impl Study {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         self.guard_inputs(configured)?;
-        match self.shards.plan_only || self.shards.shard.is_some() {
-            true => check_folder(&self.out)?,
-            false => drop(RunFolder::open(&self.out, study::STUDY_RECORD)?),
-        }
+        self.shards.check_folder(&self.out, study::STUDY_RECORD)?;
         let is_binary64 = configured.settings.study.reference;
         if let Some(path) = &self.shards.plan {
             configured.refuse_with_plan()?;
@@ -164,10 +160,7 @@ impl Study {
             study.write_plan(&self.out)?;
         }
         // Open before the work, so that an unwritable folder is reported at once.
-        let Some(mut run) = study.open(&self.out, self.shards.shard, true)? else {
-            tracing::info!("this part exists already and is complete");
-            return Ok(Exit::Ok.into());
-        };
+        let Some(mut run) = study.open(&self.out, self.shards.shard, true)? else { return Ok(Exit::Ok.into()) };
         let units = run.units();
         let lanes = plan.first_lane_of(units.end) - plan.first_lane_of(units.start);
         tracing::info!("{} runs on {}", readable::count(lanes), backend.describe());
@@ -222,7 +215,7 @@ impl Study {
 
     /// Checks that every flag has an effect, and that the lane table replaces no other result.
     fn guard_inputs(&self, configured: &Configured) -> Result<()> {
-        if configured.settings.study.compare_reference && (self.shards.shard.is_some() || self.shards.plan_only) {
+        if configured.settings.study.compare_reference && self.shards.is_split() {
             let problem = "a part of a run cannot compare the arithmetics of the whole run";
             return Err(Error::usage(Place::item("study.compare_reference"), problem, "leave it out"));
         }

@@ -10,7 +10,7 @@ use lanesweep::engine::{Backend, Constants, CpuBackend, Headway, LanePlan, Outco
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{SAMPLE_PURPOSE, generator_of};
-use lanesweep::run::study::plan_of_parts;
+use lanesweep::run::study::{StudyOptions, plan_of_parts};
 use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions, Reduction, Sizes, SvdBasis};
 use lanesweep::scenario::{Category, Scenario, Tables};
 use lanesweep::stats::density::{Bandwidth, BandwidthRule, Kde, ParameterSpace, SearchEnd};
@@ -85,7 +85,8 @@ fn study(profile: &Profile) -> LanePlan {
     let held: Vec<Scenario> = Category::ALL.iter().flat_map(|of| (0..2).map(|number| scenario(*of, number))).collect();
     let reductions = Category::ALL.map(|of| (of, reduction(of, &options)));
     let headways = vec![Headway::ThwS(1.2), Headway::ThwS(0.4), Headway::GapM(9.0)];
-    plan_of_parts((profile.clone(), models(), headways), options, &reductions, &held).unwrap()
+    let options = StudyOptions { models: models(), headways, parameterization: options, ..StudyOptions::default() };
+    plan_of_parts(profile, &options, &reductions, &held).unwrap()
 }
 
 fn lanes(digests: &mut [Sha256; 2], plan: &LanePlan) -> usize {

@@ -98,11 +98,6 @@ impl KernelCounts {
         self.samples.len()
     }
 
-    /// Number of groups and of counts.
-    pub(super) fn shape(&self) -> [usize; 2] {
-        [self.samples.len(), self.failures.len()]
-    }
-
     /// Lanes and failed lanes over some cells (headway × model × criterion), group by group.
     pub fn over(&self, cells: &[usize]) -> (Vec<u64>, Vec<u64>) {
         let groups = self.samples.len();

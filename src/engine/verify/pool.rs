@@ -58,25 +58,10 @@ impl Pool {
         let mut tables = Tables::default();
         // Here the category only separates the streams of the kinds.
         let draw = |kind: usize, k: u64| CaseRandom::new(Purpose::Pool, seed, Category::CutIn, k, kind);
-        let mut speeds = |kind: usize, make: fn(&mut CaseRandom, f64) -> Vec<f64>| -> Vec<Slice> {
-            let mut one = |k| {
-                let series = make(&mut draw(kind, k), dt_s);
-                let slice = Slice { offset: tables.speed.len() as u32, len: series.len() as u32 };
-                tables.speed.extend(series);
-                slice
-            };
-            (0..PER_KIND).map(&mut one).collect()
-        };
-        let (varied, braked) = (speeds(0, varied_speed), speeds(1, braked_speed));
-        let across = [LateralRole::In, LateralRole::Out, LateralRole::Within].map(|across| {
-            let mut one = |k| {
-                let series = lateral(&mut draw(2 + across as usize, k), across, dt_s);
-                let slice = Slice { offset: tables.lateral.len() as u32, len: series.len() as u32 };
-                tables.lateral.extend(series);
-                slice
-            };
-            (0..PER_KIND).map(&mut one).collect()
-        });
+        let varied = appended(&mut tables.speed, |k| varied_speed(&mut draw(0, k), dt_s));
+        let braked = appended(&mut tables.speed, |k| braked_speed(&mut draw(1, k), dt_s));
+        let across = [LateralRole::In, LateralRole::Out, LateralRole::Within]
+            .map(|across| appended(&mut tables.lateral, |k| lateral(&mut draw(2 + across as usize, k), across, dt_s)));
         Pool { tables, varied, braked, across }
     }
 
@@ -94,6 +79,17 @@ impl Pool {
         let (position_m, towards_mps) = slice.of(&self.tables.lateral).iter().map(|&[y, w]| (y, w)).unzip();
         (Lateral::Sampled { position_m, towards_mps }, slice)
     }
+}
+
+/// Appends the series of a kind to a table.
+fn appended<T>(table: &mut Vec<T>, make: impl Fn(u64) -> Vec<T>) -> Vec<Slice> {
+    let append = |k| {
+        let series = make(k);
+        let slice = Slice { offset: table.len() as u32, len: series.len() as u32 };
+        table.extend(series);
+        slice
+    };
+    (0..PER_KIND).map(append).collect()
 }
 
 impl Slice {

@@ -112,10 +112,9 @@ impl RandomCases {
     }
 
     fn encode(&self, draw: &mut CaseRandom, mut drawn: CaseInPool) -> LaneCase<f64> {
-        let exposed = !self.frozen.is_empty() && drawn.case.category == Category::CutOut;
         let mut scratch = Tables::default();
         let mut lane = LaneCase::encode(&drawn.case, &self.profile, &mut scratch);
-        if exposed && froze(&lane) {
+        if !self.frozen.is_empty() && drawn.case.category == Category::CutOut && froze(&lane) {
             let frozen = &self.frozen[draw.below(self.frozen.len())];
             return frozen.before(&drawn.case);
         }
@@ -191,21 +190,15 @@ impl RandomCases {
         let sampled_speed = variant == 0 || (variant > 1 && draw.chance(0.5));
         let sampled_lateral = variant == 0 || (variant > 1 && !sampled_speed);
         let braked = draw.chance(if brakes { 0.7 } else { 0.25 });
-        let mut slices = NO_SLICES;
-        let speed = if sampled_speed {
-            let (speed, slice) = self.pool.speed(draw, braked);
-            slices.speed = slice;
-            speed
-        } else {
-            kinematic_speed(draw, braked)
+        let (speed, speed_slice) = match sampled_speed {
+            true => self.pool.speed(draw, braked),
+            false => (kinematic_speed(draw, braked), NO_SLICES.speed),
         };
-        let lateral = if sampled_lateral {
-            let (lateral, slice) = self.pool.lateral(draw, across);
-            slices.lateral = slice;
-            lateral
-        } else {
-            kinematic_lateral(draw, across)
+        let (lateral, lateral_slice) = match sampled_lateral {
+            true => self.pool.lateral(draw, across),
+            false => (kinematic_lateral(draw, across), NO_SLICES.lateral),
         };
+        let slices = Slices { speed: speed_slice, lateral: lateral_slice };
         (Participant { length_m, width_m, speed, lateral }, slices)
     }
 }

@@ -63,7 +63,12 @@ pub(super) fn boundaries(subject: &Subject, profile: &Profile, budget: &StepBudg
             continue;
         }
         let value = si * parameter.per_si;
-        let verdicts = |value: f64| verdicts(subject, profile, parameter, value, budget);
+        // `None` for a value that makes no case, and once the budget is spent.
+        let verdicts = |value: f64| {
+            let point = subject.point().with(parameter.quantity, parameter.si(value));
+            let lane = subject.lane(profile, &point).ok().filter(|_| !budget.is_spent())?;
+            Some(super::verdicts(&lane, &point, profile, subject.category(), budget))
+        };
         let side = |end: f64| -> Vec<(f64, CaseVerdicts)> {
             let range = end - value;
             let step = range.abs() / f64::from(SCANNED);
@@ -124,20 +129,4 @@ fn nearest<T: PartialEq>(
 fn change_of<T>([below, above]: &[Option<(f64, T)>; 2]) -> Change {
     let at = |found: &Option<(f64, T)>| found.as_ref().map(|(at, _)| *at);
     Change { below: at(below), above: at(above) }
-}
-
-/// The verdicts with another value of one parameter. `None` also if the step budget is spent.
-fn verdicts(
-    subject: &Subject,
-    profile: &Profile,
-    parameter: &MapParameter,
-    value: f64,
-    budget: &StepBudget,
-) -> Option<CaseVerdicts> {
-    if budget.is_spent() {
-        return None;
-    }
-    let point = subject.point().with(parameter.quantity, parameter.si(value));
-    let lane = subject.lane(profile, &point).ok()?;
-    Some(super::verdicts(&lane, &point, profile, subject.category(), budget))
 }

@@ -136,14 +136,11 @@ impl Clause {
 pub(super) fn readings(
     profile: &Profile,
     category: Category,
-    unreacting: &Trace,
+    unreacting: impl FnOnce() -> Trace,
     trace: &dyn Fn(ModelId) -> Trace,
     attends_at_once: bool,
 ) -> Vec<Reading> {
-    let mut list = match category {
-        Category::CutIn => lane_intrusion(profile, unreacting),
-        Category::CutOut | Category::Lvd => Vec::new(),
-    };
+    let mut list = lane_intrusion(profile, category, unreacting);
     if !attends_at_once {
         list.extend(competent_driver(profile, category, &trace(ModelId::Cchdm)));
     }
@@ -189,11 +186,16 @@ impl Intrusion {
 
 /// The cut-in clause (UN R157, 5.2.5.2; EU 2022/1426, 1.4.2): a collision must be avoided if (a), (b) and (c) hold. EU
 /// 2022/1426 has no (b). No reading for a profile without a clause.
-pub(super) fn lane_intrusion(profile: &Profile, trace: &Trace) -> Vec<Reading> {
+pub(super) fn lane_intrusion(
+    profile: &Profile,
+    category: Category,
+    unreacting: impl FnOnce() -> Trace,
+) -> Vec<Reading> {
     let constants = &profile.reg157;
-    if constants.clause.is_empty() {
+    if category != Category::CutIn || constants.clause.is_empty() {
         return Vec::new();
     }
+    let trace = &unreacting();
     let other = |step: &TracedStep| step.others[0];
     let marking_gap_m = (trace.lane_width_m - trace.ego_width_m) / 2.0;
     let intrusion = Intrusion::of(trace, constants.intrusion_gap_m(marking_gap_m));
@@ -317,7 +319,7 @@ fn competent_driver(profile: &Profile, category: Category, trace: &Trace) -> Vec
             "perceived after the risk perception time",
         )]
     };
-    let danger = match category {
+    let (quantity, value, threshold) = match category {
         Category::CutIn => {
             // A vehicle behind the ego has no TTC.
             let is_ahead = |step: &&TracedStep| step.others[0].gap_m + trace.mean_lengths_m[0] >= 0.0;
@@ -332,7 +334,6 @@ fn competent_driver(profile: &Profile, category: Category, trace: &Trace) -> Vec
             ("headway when perceived", headway_s, constants.cut_out_headway_s + tolerance_s)
         }
     };
-    let (quantity, value, threshold) = danger;
     // Profiles without the headway test a TTC instead.
     if threshold > 0.0 {
         let then = if category != Category::CutIn && constants.cut_out_headway_tolerance_m > 0.0 {

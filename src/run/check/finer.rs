@@ -1,10 +1,8 @@
 //! The runs of a check with a tenth of the time step: what the step itself changes.
 
-use super::subject::Subject;
-use super::{Judgement, StepBudget};
+use super::{Check, Judgement, StepBudget};
 use crate::grid::Perturbation;
 use lanesweep_engine::Outcome;
-use lanesweep_model::driver::ModelId;
 use lanesweep_model::profile::Profile;
 use lanesweep_support::Result;
 
@@ -18,17 +16,13 @@ pub struct FinerStep {
 }
 
 impl FinerStep {
-    pub(super) fn run(
-        subject: &Subject,
-        profile: &Profile,
-        models: &[ModelId],
-        budget: &StepBudget,
-    ) -> Result<FinerStep> {
+    pub(super) fn run(check: &Check, profile: &Profile, budget: &StepBudget) -> Result<FinerStep> {
         budget.check()?;
+        let subject = &check.subject;
         let profile = Perturbation::FINER_STEP.profile(profile)?;
         let lane = subject.lane(&profile, subject.point())?;
         let outcomes: Vec<_> =
-            models.iter().map(|model| lane.run(&profile, subject.category(), *model).outcome).collect();
+            check.models.iter().map(|model| lane.run(&profile, subject.category(), *model).outcome).collect();
         outcomes.iter().for_each(|outcome| budget.take(outcome));
         Ok(FinerStep { dt_s: profile.frame.dt_s, outcomes })
     }

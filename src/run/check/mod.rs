@@ -285,7 +285,7 @@ impl Check {
             flips: driver(model),
             touches: touching.contains(&model),
         });
-        let unreacting = lane.unreacting(profile, category);
+        let unreacting = || lane.unreacting(profile, category);
         let attends_at_once = annex::attends_at_once(profile, category, &lane);
         let (mut silent, turned) = self.silent(profile, &changed[0], &budget)?;
         silent.extend(attends_at_once.map(str::to_owned));
@@ -295,7 +295,7 @@ impl Check {
         let (mut boundaries, mut finer, mut by_rule) = Default::default();
         if with_boundaries {
             boundaries = boundary::boundaries(&self.subject, profile, &budget)?;
-            finer = Some(FinerStep::run(&self.subject, profile, &self.models, &budget)?);
+            finer = Some(FinerStep::run(self, profile, &budget)?);
             by_rule = self.by_rule(profile, (&changed, &touching), &budget)?;
         }
         Ok(Judgement {
@@ -314,7 +314,7 @@ impl Check {
             reading_turns_answer: turned.iter().any(|other| other.verdicts.answer() != is.answer()),
             reading_turns_demand: turned.iter().any(|other| other.demand != changed[0].demand),
             reading_turns: is.reference_drivers.iter().filter(turns).copied().collect(),
-            readings: clauses::readings(profile, category, &unreacting, &trace, attends_at_once.is_some()),
+            readings: clauses::readings(profile, category, unreacting, &trace, attends_at_once.is_some()),
             boundaries,
             finer,
             by_rule,
@@ -369,10 +369,7 @@ impl Check {
         let lane = self.subject.lane(profile, point)?;
         let profile = &*annex::read_in(profile, tests_once, &lane, category);
         let verdicts = verdicts(&lane, point, profile, category, budget);
-        let readings = match category {
-            Category::CutIn => clauses::lane_intrusion(profile, &lane.unreacting(profile, category)),
-            Category::CutOut | Category::Lvd => Vec::new(),
-        };
+        let readings = clauses::lane_intrusion(profile, category, || lane.unreacting(profile, category));
         Ok(Changed { by, verdicts, demand: clauses::demand(&readings) })
     }
 

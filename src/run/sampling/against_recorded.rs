@@ -12,30 +12,24 @@ use super::sample_options::SampleHeadways;
 use crate::study::{StudyOptions, plan_study};
 use lanesweep_engine::{CpuBackend, Executor, Headway, KernelCounts, LanePlan, Verdicts, Wanted, cell_of};
 use lanesweep_model::driver::ModelId;
-use lanesweep_model::profile::Profile;
 use lanesweep_model::scenario::Category;
 use lanesweep_random::Stream;
-use lanesweep_stats::density::DensityModel;
 use lanesweep_stats::estimate::{Clusters, Ratio, RatioVerdict, Warning, paired_ratio};
 use lanesweep_support::{Error, Result};
 
 /// The lanes of S and of S' under the density's parameterization, with scenarios as kernels. `None` if the density
 /// cannot be replayed.
-fn replay(
-    density: &DensityModel,
-    profile: &Profile,
-    models: &[ModelId],
-    headways: &[Headway],
-) -> Result<Option<[KernelCounts; 2]>> {
+fn replay(sample: &Sample, headways: &[Headway]) -> Result<Option<[KernelCounts; 2]>> {
+    let (density, models) = (&sample.density, &sample.options.models);
     let id = density.space.id();
     let options = StudyOptions {
         categories: vec![id.category],
-        models: models.to_vec(),
+        models: models.clone(),
         headways: headways.to_vec(),
         parameterization: density.space.options().clone(),
         ..StudyOptions::default()
     };
-    let plan = match plan_study(&density.scenarios, profile, &options) {
+    let plan = match plan_study(&density.scenarios, &sample.profile, &options) {
         Ok(plan) => plan,
         // A failed comparison does not invalidate the samples.
         Err(Error::Input { .. } | Error::Usage { .. }) => return Ok(None),
@@ -89,7 +83,7 @@ impl Sample {
             carrier.scenario = density.scenarios.get(carrier.of.kernel).map(|scenario| scenario.id.clone());
         }
         let is_comparable = !density.scenarios.is_empty();
-        let replayed = is_comparable.then(|| replay(density, &self.profile, &options.models, &headways));
+        let replayed = is_comparable.then(|| replay(self, &headways));
         let Some([recorded, replayed]) = replayed.transpose()?.flatten() else {
             result.rows.iter_mut().for_each(|row| row.estimate.trust.warn_if(true, Warning::NotCompared));
             return Ok(result);

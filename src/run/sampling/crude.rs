@@ -5,14 +5,13 @@ use std::time::Instant;
 
 use serde::Serialize;
 
+use super::Sample;
 use super::estimate_rows::{EstimateRow, crude_rows};
-use super::sample_options::SampleOptions;
 use super::sample_run::SampleCounts;
 use crate::parts::{Computed, EachChunk, Ledger};
 use lanesweep_engine::{Executor, LanePlan, SampleTally, SweepSummary, Wanted};
 use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::ModelId;
-use lanesweep_stats::density::Exposure;
 use lanesweep_stats::estimate::{StopReason, StopRule, next_checkpoint};
 use lanesweep_support::{Error, Place, Result, option};
 
@@ -63,14 +62,13 @@ pub(super) fn checkpoints(samples: u64) -> Vec<u64> {
 /// [`Error::Usage`] for stop rules with a part of the samples; those of the backends, of `each` and of the ledger's journal;
 /// [`Error::Interrupted`].
 pub(super) fn sample_into(
+    sample: &Sample,
     plan: &LanePlan,
     ledger: &mut Ledger<SampleCounts>,
     executor: &Executor,
-    options: &SampleOptions,
-    exposure: Option<&Exposure>,
     mut each: Option<&mut EachChunk>,
 ) -> Result<Computed> {
-    let started = Instant::now();
+    let (started, options) = (Instant::now(), &sample.options);
     let range = ledger.units();
     if range.is_empty() {
         return Ok(Computed::whole(SweepSummary::default()));
@@ -113,7 +111,7 @@ pub(super) fn sample_into(
             false => {
                 let found = ledger.counts(before..at)?.and_then(SampleCounts::crude);
                 tally = found.into_iter().try_fold(tally, SampleTally::merge)?;
-                let rows = crude_rows(plan, &tally, options, exposure, StopReason::Samples);
+                let rows = crude_rows(sample, plan, &tally, StopReason::Samples);
                 // The widest of the criterion's intervals over all models decides. More samples reduce the uncertainty of the
                 // draws, never that of the data.
                 let judged = rows.iter().filter(|row| row.criterion == options.criterion && row.is_overall(&rows));
@@ -132,12 +130,7 @@ pub(super) fn sample_into(
 ///
 /// # Errors
 /// [`Error::Input`] if parts are of different runs or contain the same samples.
-pub(super) fn crude_of_segments(
-    plan: &LanePlan,
-    mut segments: Vec<SampleTally>,
-    options: &SampleOptions,
-    exposure: Option<&Exposure>,
-) -> Result<CrudeRun> {
+pub(super) fn crude_of_segments(sample: &Sample, plan: &LanePlan, mut segments: Vec<SampleTally>) -> Result<CrudeRun> {
     segments.sort_by_key(|segment| segment.covered().first().map_or(0, |range| range.start));
     let looks = checkpoints(plan.unit_count());
     let mut tally = SampleTally::empty(plan);
@@ -149,7 +142,7 @@ pub(super) fn crude_of_segments(
             && covered.start == 0
             && looks.contains(&covered.end)
         {
-            let rows = overall(&crude_rows(plan, &tally, options, exposure, StopReason::Samples));
+            let rows = overall(&crude_rows(sample, plan, &tally, StopReason::Samples));
             convergence.push(Checkpoint { samples: covered.end, rows });
         }
     }

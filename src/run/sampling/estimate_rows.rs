@@ -3,8 +3,8 @@
 
 use serde::Serialize;
 
+use super::Sample;
 use super::bandwidth::{AtBandwidth, BandwidthVerdict};
-use super::sample_options::SampleOptions;
 use super::uncertainty::Uncertainty;
 use lanesweep_engine::{LanePlan, SampleTally, cell_of};
 use lanesweep_model::criterion::Criterion;
@@ -169,13 +169,12 @@ impl EstimateRow {
 
 /// All rows of crude Monte Carlo. Headways share their samples, so the mean over them treats samples as clusters.
 pub(crate) fn crude_rows(
+    sample: &Sample,
     plan: &LanePlan,
     tally: &SampleTally,
-    options: &SampleOptions,
-    exposure: Option<&Exposure>,
     stopped: StopReason,
 ) -> Vec<EstimateRow> {
-    let level = options.level;
+    let (exposure, level) = (sample.exposure(), sample.options.level);
     let (headways, models, criteria) = (plan.headways.len(), plan.models.len(), Criterion::ALL.len());
     let runs = tally.valid();
     let kernels = plan.generator().map_or(0, |of| of.points.components() as usize);
@@ -206,7 +205,7 @@ pub(crate) fn crude_rows(
                 let failures = tally.failures[cell(headway)];
                 let counts = Counts { runs, failures, voids: tally.voids };
                 let estimate = from_counts(&counts, level, stopped);
-                push(options.headway_name(headway), estimate, &[cell(headway)]);
+                push(sample.options.headway_name(headway), estimate, &[cell(headway)]);
             }
         }
     }

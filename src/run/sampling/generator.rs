@@ -32,7 +32,7 @@ pub fn generator_of(
     let points = Points {
         source: PointSource::Random(stream),
         dimensions,
-        means: kde.points().iter().flatten().map(|&v| rounded(v)).collect(),
+        means: kde.points().iter().flatten().map(|&v| f32::from_f64(v)).collect(),
         deviations: kde.spread().iter().map(|&v| v as f32).collect(),
     };
     assembled(space, points, sizes, profile)
@@ -55,7 +55,7 @@ pub fn generator_of_points(
     let points = Points {
         source: PointSource::Given,
         dimensions: d,
-        means: points.iter().flatten().map(|&v| rounded(v)).collect(),
+        means: points.iter().flatten().map(|&v| f32::from_f64(v)).collect(),
         deviations: vec![0.0; d],
     };
     assembled(space, points, sizes, profile)
@@ -218,15 +218,11 @@ fn columns(space: &ParameterSpace) -> ReducedColumns {
     }
 }
 
-/// Rounds once to the lane arithmetic; −0 becomes 0, because no number of a lane is −0.
-fn rounded(value: f64) -> f32 {
-    f32::from_f64(value)
-}
-
 /// Mean and directions divided by the weights, so that a lane only multiplies and adds.
 fn basis(space: &ParameterSpace) -> Vec<f32> {
     let (Some(reduction), Some(d)) = (space.reduction(), space.id().coefficients()) else { return Vec::new() };
     let basis = &reduction.basis;
-    let divided = |row: &Vec<f64>| row.iter().zip(&basis.weights).map(|(v, w)| rounded(v / w)).collect::<Vec<_>>();
+    let divided =
+        |row: &Vec<f64>| row.iter().zip(&basis.weights).map(|(v, w)| f32::from_f64(v / w)).collect::<Vec<_>>();
     std::iter::once(&basis.mean).chain(&basis.directions[..d]).flat_map(divided).collect()
 }

@@ -122,7 +122,7 @@ impl Job for Sample {
         each: Option<&mut EachChunk>,
     ) -> Result<Computed> {
         match &self.kind {
-            SampleKind::Crude(plan) => sample_into(plan, ledger, executor, &self.options, self.exposure(), each),
+            SampleKind::Crude(plan) => sample_into(self, plan, ledger, executor, each),
             SampleKind::Weighted(weighted) => {
                 self.sample_weighted(weighted, ledger, executor)?;
                 Ok(Computed::whole(SweepSummary::default()))
@@ -141,16 +141,15 @@ impl Job for Sample {
     }
 
     fn result(&self, counts: Vec<SampleCounts>, computed: Computed, place: Place) -> Result<SampleResult> {
-        let (options, exposure) = (&self.options, self.exposure());
         let result = match &self.kind {
             SampleKind::Crude(plan) => {
                 let tallies = counts.into_iter().filter_map(SampleCounts::crude).collect();
-                let run = crude_of_segments(plan, tallies, options, exposure)?;
-                if options.stop.is_fixed() && run.tally.samples() != self.unit_count() {
+                let run = crude_of_segments(self, plan, tallies)?;
+                if self.options.stop.is_fixed() && run.tally.samples() != self.unit_count() {
                     let problem = "the parts do not hold every sample that their names stand for";
                     return Err(Error::input(place, problem, "make them again"));
                 }
-                let rows = crude_rows(plan, &run.tally, options, exposure, computed.stopped);
+                let rows = crude_rows(self, plan, &run.tally, computed.stopped);
                 let rechecked_lanes = computed.summary.rechecked_lanes;
                 SampleResult { rows, rechecked_lanes, crude: Some(run), ..SampleResult::default() }
             }

@@ -140,10 +140,9 @@ impl Sample {
             let mut estimate = estimate.after_search(searched);
             estimate.trust.warn_if(weighted.draws.crude_per_draw == 0, Warning::NotBounded);
             let headway = options.headway_name(question.headway);
-            let with = shares.as_ref().map(|of| {
-                let carriers = of.carriers.clone();
-                (estimate.clone().over_kernels(of), of.effective_failing, carriers)
-            });
+            let with = shares
+                .as_ref()
+                .map(|of| (estimate.clone().over_kernels(of), of.effective_failing, of.carriers.clone()));
             let row = EstimateRow::of_draws(question.model, question.criterion, headway, estimate, exposure);
             rows.push(row.with_data(with, exposure));
         }
@@ -162,22 +161,12 @@ pub struct WeightedTally {
     pub sums: Vec<(Question, BlockSums<WeightSums>)>,
 }
 
-impl WeightedTally {
-    fn questions(&self) -> Vec<Question> {
-        self.sums.iter().map(|(question, _)| *question).collect()
-    }
-}
-
 impl MergeableCounts for WeightedTally {
     fn covered(&self) -> Vec<Range<u64>> {
         self.sums.first().map_or_else(Vec::new, |(_, sums)| sums.ranges())
     }
 
     fn join(mut self, other: Self) -> Result<Self> {
-        if self.questions() != other.questions() {
-            let help = "join only counts of one run: same density, proposal, flags and seed";
-            return Err(Error::input(Place::item("weighted sums"), "they answer other questions", help));
-        }
         for ((_, ours), (_, theirs)) in self.sums.iter_mut().zip(other.sums) {
             ours.merge(theirs)?;
         }

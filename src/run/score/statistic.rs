@@ -43,10 +43,6 @@ impl<'a> Scenarios<'a> {
         Some(self.units.iter().filter_map(move |unit| unit.cells.get(at)))
     }
 
-    fn f1(self, variant: &str, model: ModelId, criterion: Criterion) -> Option<ScenarioRate> {
-        Some(ScenarioRate::f1(self.counts(variant, model, criterion)?))
-    }
-
     /// One kind of error over 2TP + FP + FN.
     fn share(
         self,
@@ -78,7 +74,7 @@ impl Statistic {
     /// The value with its interval; `None` if it is 0/0 or was not run.
     pub(super) fn value(&self, of: Scenarios, cell: (ModelId, Criterion), level: f64) -> Option<(f64, ScoreInterval)> {
         let (model, criterion) = cell;
-        let f1 = |variant: &&str| of.f1(variant, model, criterion);
+        let f1 = |variant: &&str| Some(ScenarioRate::f1(of.counts(variant, model, criterion)?));
         let pairs = |first: usize, second: usize| {
             let pair = move |k: usize| (first..first + second).map(move |l| Contrast::difference(k, l));
             (0..first).flat_map(pair).collect::<Vec<_>>()

@@ -131,14 +131,7 @@ pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyO
         blocks.push(block);
         reductions.push(reduction);
     }
-    let head = StudyHead::new(
-        profile.clone(),
-        options.models.clone(),
-        options.headways.clone(),
-        parameterization.clone(),
-        blocks,
-        &held,
-    )?;
+    let head = StudyHead::new(profile, options, blocks, &held)?;
     // The report data need more of the decompositions than the file stores.
     Ok(StudyCases { reductions, left_out, ..head.with_scenarios(0, held)? })
 }

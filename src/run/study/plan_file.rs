@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::cases::decompositions;
+use super::plan::StudyOptions;
 use crate::score::CROSS_VALIDATED;
 use lanesweep_engine::plan::{Headway, LanePlan};
 use lanesweep_engine::version::Canonical;
@@ -128,8 +129,8 @@ impl BlockHead {
 /// [`Error::Internal`] for parts that do not fit.
 #[doc(hidden)]
 pub fn plan_of_parts(
-    (profile, models, headways): (Profile, Vec<ModelId>, Vec<Headway>),
-    options: ParameterizationOptions,
+    profile: &Profile,
+    options: &StudyOptions,
     categories: &[(Category, Reduction)],
     scenarios: &[Scenario],
 ) -> Result<LanePlan> {
@@ -138,25 +139,30 @@ pub fn plan_of_parts(
         |(of, reduction): &(Category, Reduction)| BlockHead::new(*of, units(*of), Some(reduction), &[], Vec::new());
     let blocks = categories.iter().map(block).collect();
     let held: Vec<Scenario> = scenarios.iter().map(|scenario| stripped(scenario, None)).collect();
-    let head = StudyHead::new(profile, models, headways, options, blocks, &held)?;
+    let head = StudyHead::new(profile, options, blocks, &held)?;
     head.with_scenarios(0, held)?.window(0..scenarios.len() as u64)
 }
 
 impl StudyHead {
     /// The head for scenarios that are all held.
     pub(crate) fn new(
-        profile: Profile,
-        models: Vec<ModelId>,
-        headways: Vec<Headway>,
-        parameterization: ParameterizationOptions,
+        profile: &Profile,
+        options: &StudyOptions,
         blocks: Vec<BlockHead>,
         held: &[Scenario],
     ) -> Result<StudyHead> {
         let page = |scenarios| lines(scenarios).map(|text| (text.len() as u64, hex(&Sha256::digest(text))));
         let pages: std::io::Result<_> = held.chunks(PAGE as usize).map(page).collect();
         let pages = pages.map_err(|e| Error::Internal(format!("a scenario cannot be written: {e}")))?;
-        let plan_sha256 = String::new();
-        let mut head = StudyHead { plan_sha256, profile, models, headways, parameterization, blocks, pages };
+        let mut head = StudyHead {
+            plan_sha256: String::new(),
+            profile: profile.clone(),
+            models: options.models.clone(),
+            headways: options.headways.clone(),
+            parameterization: options.parameterization.clone(),
+            blocks,
+            pages,
+        };
         head.plan_sha256 = head.hash()?;
         Ok(head)
     }
