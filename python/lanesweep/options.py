@@ -16,11 +16,11 @@ from . import _core
 from ._driver import Driver
 
 _LISTS = _core.lists()
-#: Names of the profiles in the program, for `profile` and `profiles`.
+#: Names of the built-in profiles, for `profile` and `profiles`.
 PROFILES: list[str] = _LISTS["profiles"]
 #: Names of the built-in driver models, for `models`.
 MODELS: list[str] = _LISTS["models"]
-#: Parameterizations with the features that they keep: ``"cut-in-2"``.
+#: Parameterizations, by the names of their density files (``"cut-in-2"``), with the features that they keep.
 PARAMETERIZATIONS: dict[str, str] = _LISTS["parameterizations"]
 #: Keys of ``config`` with their meanings.
 KEYS: dict[str, str] = _LISTS["keys"]

@@ -210,7 +210,8 @@ pub fn described<'py>(py: Python<'py>, function: &str) -> PyResult<Bound<'py, Py
 #[pyfunction]
 pub fn lists(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
     let keys: BTreeMap<String, String> = Key::all().into_iter().map(|key| (key.name, key.description)).collect();
-    let parameterizations = Parameterization::ALL.map(|one| (one.name().replace(' ', "-"), one.description()));
+    let parameterizations = Parameterization::ALL
+        .map(|one| (format!("{}-{}", one.category.key().replace('_', "-"), one.key), one.description()));
     let record = serde_json::json!({
         "profiles": Profile::names().collect::<Vec<_>>(),
         "models": ModelId::ALL.map(ModelId::name),

@@ -42,6 +42,7 @@ def test_examples_in_docstrings_print_what_they_say(module, tmp_path, monkeypatc
 def test_lists_have_what_the_verbs_take() -> None:
     options = lanesweep.options
     assert options.MODELS == ["Reg157", "CCHDM", "RSS", "FSM"] and len(options.PARAMETERIZATIONS) == 19
+    assert {"cut-in-2", "cut-out-g", "lvd-ii"} <= options.PARAMETERIZATIONS.keys()
     assert all(lanesweep.profile(name) for name in options.PROFILES)
     assert "time step" in options.KEYS["run.dt_s"].lower()
 

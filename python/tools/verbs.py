@@ -14,12 +14,12 @@ from typing import Any
 from lanesweep import _core
 
 FUNCTIONS = ["study", "tracks", "mine", "fit", "sample", "map", "check", "trace", "merge", "devices"]
-#: Numbers of a case: in Python a mapping, or a row of a table, has them.
+#: Flags of a case that are the keys of `Case` in Python.
 CASE = """category ego_speed speed gap thw lateral_speed lateral_distance acceleration end_speed ahead_speed ahead_gap
     length width ego_length ego_width lane_width""".split()
-#: Arguments that a function of Python leaves out: a recorded scenario starts at a headway of its own, `lanesweep.parts` splits runs.
-ELSEWHERE = {"check": set(CASE) - {"gap", "thw"}, "trace": set(CASE) - {"gap", "thw"}, "study": ["shard", "plan", "plan_only"], "sample": ["shard", "plan", "plan_only"]}
-#: What a function does, as Python that the tests run.
+#: Flags that are no arguments. Gap and headway are arguments too: a recorded scenario can start from others than its own.
+ELSEWHERE = dict.fromkeys(["check", "trace"], set(CASE) - {"gap", "thw"}) | dict.fromkeys(["study", "sample"], {"shard", "plan", "plan_only"})
+#: Examples of the docstrings; tests run them.
 EXAMPLES = {
     "study": """
         >>> result = lanesweep.study(synth_recordings=2, models=["Reg157", "FSM"])
@@ -161,16 +161,16 @@ def written(function: str) -> tuple[str, set[str]]:
 def case() -> str:
     """The source of `Case`."""
     known = {one["name"]: one for one in _core.described("check")["arguments"]}
-    types = {name: "str" if name == "category" else "Speed" if "speed" in name and name != "lateral_speed" else "Number" for name in CASE}
+    types = {name: "Category" if name == "category" else "Speed" if "speed" in name and name != "lateral_speed" else "Number" for name in CASE}
     units = {name: f" ({known[name]['value']})" if types[name] == "Number" else "" for name in CASE}
     keys = "".join(f'    {name}: {types[name]}\n    """{sentence(known[name]["help"] + units[name])}"""\n' for name in CASE)
-    return f'\n\nclass Case(TypedDict, total=False):\n    """Numbers of one case, as a mapping; the columns of a table of cases."""\n\n{keys}'
+    return f'\n\nclass Case(TypedDict, total=False):\n    """One case, as a mapping. A table of cases has these names as columns."""\n\n{keys}'
 
 
 def module() -> str:
     """The source of `_verbs.py`."""
     made = [written(function) for function in FUNCTIONS]
-    types = sorted(set().union({"Number", "Speed"}, *(types for _, types in made)) - {"Any", "Case", "Literal", "Mapping", "None"})
+    types = sorted(set().union({"Category", "Number", "Speed"}, *(types for _, types in made)) - {"Any", "Case", "Literal", "Mapping", "None"})
     names = "".join(f'\n    "{name}",' for name in sorted(["Case", *FUNCTIONS]))
     head = HEAD.format(types="(" + "".join(f"\n    {one}," for one in types) + "\n)", names=names + "\n")
     return head + case() + "".join(text for text, _ in made)

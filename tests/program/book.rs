@@ -64,11 +64,13 @@ fn commands_print_what_the_book_says() {
     let chapters: Vec<Document> =
         chapters().into_iter().filter(|chapter| chapter.blocks().any(|block| block.language == "console")).collect();
     assert!(!chapters.is_empty(), "no chapter has a console block");
-    chapters.par_iter().for_each(|chapter| {
+    let differences = chapters.par_iter().filter_map(|chapter| {
         let dir = tempfile::tempdir().unwrap();
         chapter.files().iter().for_each(|(file, content)| fs::write(dir.path().join(file), content).unwrap());
-        console::check(&root().join(&chapter.path), dir.path());
+        console::difference(&root().join(&chapter.path), dir.path())
     });
+    let differences: Vec<String> = differences.collect();
+    assert!(differences.is_empty(), "{}", differences.join("\n\n"));
 }
 
 #[test]
