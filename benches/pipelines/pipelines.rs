@@ -4,7 +4,7 @@
 //! `cargo run --release -p lanesweep-pipelines -- --out FOLDER [--profile NAME]...` writes every kernel as WGSL with
 //! its constants, SPIR-V, HLSL and MSL to FOLDER, and below it the machine code of each device that gives it. CSV rows go to stdout: one per
 //! device, kernel and statistic of the driver. All profiles are compiled unless some are named; a kernel that two
-//! profiles share is compiled once. `--plant fused`, `spill` or `wgsl` puts in a defect that a check must find. `--steps` prints how many steps
+//! profiles share is compiled once. `--sources` ends once the sources are written and needs no driver. `--plant fused`, `spill` or `wgsl` puts in a defect that a check must find. `--steps` prints how many steps
 //! lanes of a study and of densities and their warps make instead, and how many if quiescent ones were skipped.
 
 // Vulkan's functions are unsafe: every handle comes from this file and outlives its use.

@@ -376,6 +376,7 @@ def test_values_keep_their_meaning_and_names_their_letters(density, scenarios, t
     for call, kind, message in [
         (lambda: lanesweep.check(case, gap_=3), TypeError, "unexpected keyword argument 'gap_'"),
         (lambda: lanesweep.check(case, quiet=True), TypeError, "unexpected keyword argument 'quiet'"),
+        (lambda: lanesweep.check(case, row=7), lanesweep.LanesweepError, "row 7"),
         (lambda: lanesweep.check(row=7), lanesweep.UsageError, "`row`: it needs `file`"),
         (lambda: lanesweep.trace(from_=tmp_path), lanesweep.UsageError, "`from_`: it needs `lane`"),
         (lambda: lanesweep.study(scenarios), lanesweep.UsageError, "give it as `scenarios`"),

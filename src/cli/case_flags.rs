@@ -1,6 +1,7 @@
 //! Concrete cases from flags, a TOML file or a table.
 
 use std::collections::HashMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::Path;
 
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
@@ -192,13 +193,18 @@ pub(super) struct GivenCases {
     lines: HashMap<String, u64>,
     /// Where each id of several rows was last.
     doubled: HashMap<String, u64>,
+    /// First row of each case, by the hash of its values.
+    cases: HashMap<u64, usize>,
+    /// Rows that are equal to an earlier one but for their ids, with that one.
+    copies: Vec<[usize; 2]>,
 }
 
 impl GivenCases {
     pub(super) fn open(path: &Path) -> Result<GivenCases> {
         let format = TableFormat::of(&plain_name(path), &[TableFormat::Csv, TableFormat::Parquet], &option("table"))?;
         let rows = ParameterRows::new(TableReader::open(path, format)?)?;
-        Ok(GivenCases { rows, row: 0, lines: HashMap::new(), doubled: HashMap::new() })
+        let (row, lines, doubled, cases, copies) = Default::default();
+        Ok(GivenCases { rows, row, lines, doubled, cases, copies })
     }
 
     /// Number of the last row, from 1 after the header.
@@ -214,7 +220,11 @@ impl GivenCases {
 
     /// Warnings about the rows so far.
     pub(super) fn notes(&self) -> Vec<String> {
-        self.rows.notes()
+        let number = self.copies.len();
+        let copies = self.copies.first().map(|[row, earlier]| {
+            format!("{number} row(s) are equal to another one but for their ids and count again, the first: row {row} is row {earlier}")
+        });
+        self.rows.notes().into_iter().chain(copies).collect()
     }
 
     fn doubled_with(&self, line: u64) -> Error {
@@ -233,6 +243,11 @@ impl GivenCases {
                 given.located::<()>(Err(self.doubled_with(first)))?;
             }
             self.lines.extend(given.id.clone().map(|id| (id, line)));
+            let mut hash = DefaultHasher::new();
+            (&given.models, &given.parameters.category).hash(&mut hash);
+            given.parameters.numbers.map(|number| number.map(f64::to_bits)).hash(&mut hash);
+            let first = *self.cases.entry(hash.finish()).or_insert(self.row);
+            self.copies.extend((first < self.row).then_some([self.row, first]));
             Ok(given)
         });
         Ok(Some(row))

@@ -333,7 +333,9 @@ impl Configured {
     /// As [`Configured::backend`] and [`OpenBackend::open`].
     pub(super) fn open(&self) -> Result<OpenBackend> {
         let (backend, device) = self.backend()?;
-        Ok(OpenBackend::open(backend, device)?.with_cancel(CANCEL.clone()))
+        let opened =
+            OpenBackend::open(backend, device).map_err(|error| self.at_origin("run.device", "device", error))?;
+        Ok(opened.with_cancel(CANCEL.clone()))
     }
 
     /// The same, or the CPU in binary64, which allows no other backend.
@@ -359,6 +361,6 @@ impl Configured {
     /// As [`Configured::backend`] and [`OpenBackend::open_to_verify`].
     pub(super) fn open_to_verify(&self) -> Result<OpenBackend> {
         let (backend, device) = self.backend()?;
-        OpenBackend::open_to_verify(backend, device)
+        OpenBackend::open_to_verify(backend, device).map_err(|error| self.at_origin("run.device", "device", error))
     }
 }

@@ -97,7 +97,7 @@ impl Sample {
                 let units = warn_of_long(&sample, &search);
                 // The search is kept in the folder, so it needs the folder's lock too.
                 let _folder = (!is_split).then(|| RunFolder::open(&self.out, sampling::ESTIMATE_RECORD)).transpose()?;
-                let found = configured.with_progress(units, "searching", executor, |executor| {
+                let found = configured.with_progress(units, "searching, at most", executor, |executor| {
                     sample.searched(executor, &self.out, is_split)
                 })?;
                 if !is_split {
@@ -132,7 +132,8 @@ impl Sample {
             .as_mut()
             .map(|table| |plan: &LanePlan, chunk: &Chunk| lanes::write_sampled_chunk(table, &sample, plan, chunk));
         let each = write_chunk.as_mut().map(|write| write as &mut EachChunk);
-        configured.with_progress(missing, "sampling", executor, |executor| run.compute(executor, each))?;
+        let what = if sample.options.stop.is_fixed() { "sampling" } else { "sampling, at most" };
+        configured.with_progress(missing, what, executor, |executor| run.compute(executor, each))?;
         let rows = table.map(TableWriter::stage).transpose()?;
         if self.shards.shard.is_some() {
             rows.map_or(Ok(()), StagedFile::publish)?;
@@ -144,7 +145,7 @@ impl Sample {
             tracing::info!("importance sampling of what is rare");
             let search = self.search(&sample.options.models, &sample.options.headways);
             let units = warn_of_long(&sample, &search);
-            result = configured.with_progress(units, "searching", executor, |executor| {
+            result = configured.with_progress(units, "searching, at most", executor, |executor| {
                 sample.refined(result, &search, half_width, executor)
             })?;
         }
@@ -178,7 +179,8 @@ pub(super) fn list_failures(
 ) -> Result<StagedFile> {
     let cpu = CpuBackend::lane_arithmetic();
     let executor = Executor::new(&cpu).with_cancel(CANCEL.clone());
-    configured.with_progress(sample.unit_count(), "failing lanes", &executor, |executor| {
+    let samples = result.crude.as_ref().map_or(sample.unit_count(), |run| run.tally.samples());
+    configured.with_progress(samples, "failing lanes", &executor, |executor| {
         let limit = configured.settings.sample.failures_limit;
         let each = &mut |lane: &FailingLane| lanes::write_failing_lane(&mut table, sample, lane);
         sample.failing_lanes(result, limit, executor, each)

@@ -169,8 +169,8 @@ fn attend(case: &Case, profile: &Profile, others: &mut [LaneOther<f64>; 2], tabl
     let motion = others[0].motion;
     let lateral = |step: u32| motion.lateral(tables, step).position;
     let speed = |step: u32| motion.speed(tables, step);
+    let steps = steps_seen(&motion, profile.step_cap());
     for (model, rule) in attention_rules(profile, case.category).into_iter().enumerate() {
-        let steps = steps_seen(&motion, profile.step_cap());
         let [principal, ahead] = rule.attend_from(steps, geometry, lateral, speed);
         others[0].attend_from[model] = principal;
         others[1].attend_from[model] = ahead;

@@ -167,27 +167,34 @@ pub fn same_words(a: &Outcome<f64>, b: &Outcome<f64>) -> bool {
 }
 
 /// The fields of an outcome as words with their names, in order; values as the bits of their exact widening.
-pub fn words(o: &Outcome<f64>) -> [(&'static str, u64); 17] {
-    [
-        ("verdicts", o.verdicts.0.into()),
-        ("contact", o.contact.code().into()),
-        ("contact_with", o.contact_with.into()),
-        ("end", o.end as u64),
-        ("reaction_step", o.reaction_step.into()),
-        ("contact_step", o.contact_step.into()),
-        ("end_step", o.end_step.into()),
-        ("impact_speed", o.impact_speed.to_bits()),
-        ("impact_closing_speed", o.impact_closing_speed.to_bits()),
-        ("min_ttc", o.min_ttc.to_bits()),
-        ("max_btn", o.max_btn.to_bits()),
-        ("min_gap", o.min_gap.to_bits()),
-        ("min_thw", o.min_thw.to_bits()),
-        ("max_drac", o.max_drac.to_bits()),
-        ("tet_steps", o.tet_steps.into()),
-        ("tit", o.tit.to_bits()),
+pub fn words(outcome: &Outcome<f64>) -> [(&'static str, u64); 17] {
+    // Destructures every field, so that a new field must be compared.
+    macro_rules! words {
+        ($($field:ident: $word:expr;)+) => {{
+            let &Outcome { $($field),+ } = outcome;
+            [$((stringify!($field), $word)),+]
+        }};
+    }
+    words! {
+        verdicts: verdicts.0.into();
+        contact: contact.code().into();
+        contact_with: contact_with.into();
+        end: end as u64;
+        reaction_step: reaction_step.into();
+        contact_step: contact_step.into();
+        end_step: end_step.into();
+        impact_speed: impact_speed.to_bits();
+        impact_closing_speed: impact_closing_speed.to_bits();
+        min_ttc: min_ttc.to_bits();
+        max_btn: max_btn.to_bits();
+        min_gap: min_gap.to_bits();
+        min_thw: min_thw.to_bits();
+        max_drac: max_drac.to_bits();
+        tet_steps: tet_steps.into();
+        tit: tit.to_bits();
         // No value has these bits.
-        ("pet", o.pet.map_or(u64::MAX, f64::to_bits)),
-    ]
+        pet: pet.map_or(u64::MAX, f64::to_bits);
+    }
 }
 
 /// A pseudorandom number for each seed and index (SplitMix64).

@@ -223,7 +223,7 @@ impl<R: Real> LaneRunner<'_, R> {
     }
 }
 
-/// The measures are those of binary64, beside the lane.
+/// Computes the measures in binary64 from the values that the lane used.
 fn vehicle<R: Real>(measures: &Constants<f64>, seen: &Seen<R>, x_ego_m: f64) -> TracedVehicle {
     let (view, of) = (&seen.view, R::to_f64);
     let (v_ego, v_other, gap_m) = (of(view.v_ego), of(view.v_other), of(view.gap));

@@ -8,8 +8,7 @@ use sha2::{Digest, Sha256};
 
 use super::generated::{Generator, PointSource};
 use super::lane_case::{LaneCase, LaneOther};
-use lanesweep_model::driver::MODELS;
-use lanesweep_model::scenario::Tables;
+use lanesweep_model::scenario::{Motion, Tables};
 use lanesweep_support::plain_text::hex;
 
 /// Version of the lane computation, from a scenario or a sample's index to its verdicts and values. Raise it whenever a
@@ -100,10 +99,13 @@ impl Canonical {
 
     /// A case, field by field.
     pub(crate) fn case(&mut self, case: &LaneCase<f64>) {
+        let LaneCase { others, ego_speed, ego_width, lane_width, horizon, pair } = case;
         let mut bytes = Vec::with_capacity(320);
-        case.others.iter().for_each(|other| put_other(&mut bytes, other));
-        put_floats(&mut bytes, &[case.ego_speed, case.ego_width, case.lane_width]);
-        put_words(&mut bytes, &[case.horizon, case.pair]);
+        for other in others {
+            put_other(&mut bytes, other);
+        }
+        put_floats(&mut bytes, &[*ego_speed, *ego_width, *lane_width]);
+        put_words(&mut bytes, &[*horizon, *pair]);
         self.0.update(&bytes);
     }
 
@@ -138,17 +140,42 @@ fn put_floats(bytes: &mut Vec<u8>, floats: &[f64]) {
     floats.iter().for_each(|value| bytes.extend(value.to_bits().to_le_bytes()));
 }
 
-fn put_other(bytes: &mut Vec<u8>, o: &LaneOther<f64>) {
-    // A new field must be hashed.
-    const { assert!(size_of::<LaneOther<f64>>() == (96 + 24 + 16 + 4 * MODELS).next_multiple_of(8)) };
-    let m = &o.motion;
-    put_words(bytes, &[m.kind, m.speed_offset, m.speed_len, m.lateral_offset, m.lateral_len]);
-    put_words(bytes, &[m.speed_until, m.lateral_until]);
-    put_words(bytes, &m.reserved);
-    put_words(bytes, &[o.present_from, o.present_until, o.used, o.judged]);
-    put_words(bytes, &o.attend_from);
-    put_floats(bytes, &[m.speed_initial, m.speed_per_step, m.speed_end, m.lateral_initial, m.lateral_per_step]);
-    put_floats(bytes, &[m.lateral_end, m.lateral_towards, o.half_lengths, o.half_widths, o.gap_offset]);
+fn put_other(bytes: &mut Vec<u8>, other: &LaneOther<f64>) {
+    let LaneOther {
+        motion,
+        half_lengths,
+        half_widths,
+        gap_offset,
+        present_from,
+        present_until,
+        attend_from,
+        used,
+        judged,
+    } = other;
+    let Motion {
+        kind,
+        speed_offset,
+        speed_len,
+        lateral_offset,
+        lateral_len,
+        speed_until,
+        lateral_until,
+        speed_initial,
+        speed_per_step,
+        speed_end,
+        lateral_initial,
+        lateral_per_step,
+        lateral_end,
+        lateral_towards,
+        reserved,
+    } = motion;
+    let motion = [*kind, *speed_offset, *speed_len, *lateral_offset, *lateral_len, *speed_until, *lateral_until];
+    put_words(bytes, &motion);
+    put_words(bytes, reserved);
+    put_words(bytes, &[*present_from, *present_until, *used, *judged]);
+    put_words(bytes, attend_from);
+    put_floats(bytes, &[*speed_initial, *speed_per_step, *speed_end, *lateral_initial, *lateral_per_step]);
+    put_floats(bytes, &[*lateral_end, *lateral_towards, *half_lengths, *half_widths, *gap_offset]);
 }
 
 #[cfg(test)]

@@ -165,6 +165,7 @@ impl Motion<f64> {
     pub fn set_speed(&mut self, speed: &Speed, dt_s: f64, tables: &mut Tables<f64>) {
         match speed {
             Speed::Kinematic { initial_mps, acceleration_mps2, until_s } => {
+                self.kind &= !SPEED_SAMPLED;
                 self.speed_initial = initial_mps.max(0.0);
                 self.speed_per_step = acceleration_mps2 * dt_s;
                 self.speed_until = last_step_before(*until_s, dt_s);
@@ -179,12 +180,13 @@ impl Motion<f64> {
         }
     }
 
-    /// The same across the road; a centred vehicle keeps the lateral motion.
+    /// Sets the motion across the road; [`Lateral::Centred`] changes nothing.
     pub fn set_lateral(&mut self, lateral: &Lateral, dt_s: f64, tables: &mut Tables<f64>) {
         match lateral {
             Lateral::Centred => {}
             Lateral::Kinematic { start_m, rate_mps, end_m } => {
                 let duration_s = if *rate_mps == 0.0 { 0.0 } else { (end_m - start_m) / rate_mps };
+                self.kind &= !LATERAL_SAMPLED;
                 self.lateral_initial = *start_m;
                 self.lateral_per_step = rate_mps * dt_s;
                 self.lateral_until = last_step_before(duration_s, dt_s);

@@ -163,6 +163,22 @@ fn a_longer_headway_never_turns_an_rss_lvd_pass_into_a_collision() {
     }
 }
 
+/// TTC has no such property: the shorter headway makes the ego brake earlier, and a longer one may meet the
+/// leader at a higher closing speed. Kept as a counterexample.
+#[test]
+fn a_longer_headway_can_turn_an_lvd_pass_into_a_ttc_failure() {
+    let profile = paper();
+    let mut counterexamples = 0;
+    for model in ModelId::ALL {
+        for case in lvd_grid() {
+            let fails: Vec<bool> =
+                headways().map(|thw| run(&profile, &case, model, thw).verdicts.failed(Criterion::Ttc)).collect();
+            counterexamples += usize::from(fails.windows(2).any(|pair| !pair[0] && pair[1]));
+        }
+    }
+    assert!(counterexamples > 0, "no counterexample left: the claim may be true after all, look again");
+}
+
 /// A scenario whose recorded motion already has the parameterized form.
 fn scenario(category: Category, v: Vec<f64>, y: Vec<f64>, lead: Option<Vec<f64>>) -> Scenario {
     let frame1 = v.len() - 1;

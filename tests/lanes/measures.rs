@@ -5,7 +5,7 @@ use lanesweep::model::criterion::BtnContact;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::model::scalar::Real;
-use lanesweep::scenario::{Case, Speed};
+use lanesweep::scenario::{Case, Category, Lateral, Speed};
 
 use crate::common::lane_sets::{random, run_case, run_lane};
 use crate::common::plans::beside;
@@ -174,5 +174,19 @@ fn the_btn_without_a_ramp_is_the_drac_over_the_largest_deceleration() {
                 near(found.max_btn, drac, 1e-3);
             }
         }
+    }
+}
+
+/// It comes in at 1 m/s from 3.5 m beside; half of both widths is 2 m, so it is in the path first at step 38 (1.52 s).
+#[test]
+fn the_pet_of_an_ego_that_keeps_its_speed_is_its_headway_at_the_encroachment() {
+    for (ego_mps, other_mps, gap_m) in [(30.0, 20.0, 45.1), (20.0, 25.0, 20.1), (30.0, 20.0, 17.1)] {
+        let (mut case, profile) = (beside(0.0), unreacting(60.0));
+        (case.category, case.ego_speed_mps, case.horizon_s) = (Category::CutIn, ego_mps, 2.0);
+        case.principal.speed = Speed::constant(other_mps);
+        case.principal.lateral = Lateral::Kinematic { start_m: 3.5, rate_mps: -1.0, end_m: 0.0 };
+        let pet_s = (gap_m + (other_mps - ego_mps) * 1.52) / ego_mps;
+        near(run_in::<f64>(&profile, &case, ModelId::Fsm, gap_m).pet.unwrap(), pet_s, 1e-9);
+        near(run_in::<f32>(&profile, &case, ModelId::Fsm, gap_m).pet.unwrap(), pet_s, 1e-5);
     }
 }

@@ -53,6 +53,7 @@ fn run(command: &str, dir: &Path) -> String {
     let path = format!("{folder}:{}", std::env::var("PATH").unwrap());
     let mut shell = Command::new("sh");
     shell.args(["-c", &format!("exec 2>&1\n{command}")]).current_dir(dir).env("NO_COLOR", "1").env("PATH", path);
+    shell.env_remove("LANESWEEP_CONFIG").env_remove("COLUMNS");
     let output = shell.output().unwrap();
     let status =
         if output.status.success() { String::new() } else { format!("? {}\n", output.status.code().unwrap_or(-1)) };

@@ -7,11 +7,11 @@ use crate::common::{self, program};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use lanesweep::engine::{CpuBackend, Executor, Headway};
+use lanesweep::engine::{Backend, CpuBackend, Executor, Headway, SampleTally, Wanted};
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::{MODELS, ModelId};
 use lanesweep::model::profile::Profile;
-use lanesweep::run::sampling::{Estimator, Sample, SampleHeadways, SampleOptions};
+use lanesweep::run::sampling::{Estimator, Sample, SampleHeadways, SampleOptions, plan_samples};
 use lanesweep::scenario::{Category, Driven};
 use lanesweep::stats::density::{Bandwidth, DensityModel, Exposure, Kde, write_density};
 use lanesweep::stats::estimate::Search;
@@ -292,4 +292,26 @@ fn draws_of_a_proposal_tell_their_scenarios_by_the_kernels_that_explain_them() {
     assert!(carriers(&crude).contains(&carriers(&rows[0])[0]), "{crude} {}", rows[0]);
     let few = estimated(dir.path(), "nine.json", how).0["estimates"][0].clone();
     assert!(few["estimate"]["trust"]["warnings"].to_string().contains("few_scenarios"), "{few}");
+}
+
+#[test]
+fn counts_join_in_any_order_and_never_twice_and_threads_do_not_change_them() {
+    let headways = SampleHeadways::Each(vec![Headway::ThwS(1.0), Headway::ThwS(0.4)]);
+    let profile = Profile::load("paper").unwrap();
+    let plan_of = |samples| {
+        let options = SampleOptions { seed: 5, ..SampleOptions::new(Estimator::Crude, samples, headways.clone()) };
+        plan_samples(&density(Category::CutIn, "2"), &profile, &options).unwrap()
+    };
+    let (plan, other, cpu) = (plan_of(900), plan_of(901), CpuBackend::lane_arithmetic());
+    let of = |plan, range: std::ops::Range<u64>| {
+        SampleTally::of_chunk(plan, &cpu.prepare(plan).unwrap().run(range, Wanted::Counts).unwrap()).unwrap()
+    };
+    let whole = of(&plan, 0..900);
+    assert!(whole.failures.iter().sum::<u64>() > 0);
+    assert!(of(&plan, 700..900).merge(of(&plan, 0..1)).unwrap().merge(of(&plan, 1..700)).unwrap() == whole);
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    assert!(one.install(|| of(&plan, 0..900)) == whole, "one thread");
+    assert!(of(&plan, 0..100).merge(of(&other, 100..200)).is_err(), "two runs");
+    let error = of(&plan, 0..100).merge(of(&plan, 99..200)).unwrap_err().to_string();
+    assert!(error.contains("samples 99 to 99 are in both"), "{error}");
 }

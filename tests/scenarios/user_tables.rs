@@ -198,20 +198,3 @@ fn a_truncated_parquet_file_is_told_as_one_and_no_panic_is_printed() {
         assert!(!text.contains("panicked"), "{text}");
     }
 }
-
-#[test]
-fn a_truncated_parquet_file_is_told_as_one_and_no_panic_is_printed() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("s.parquet");
-    made::write(&path, required_columns(), Compression::SNAPPY);
-    let whole = std::fs::read(&path).unwrap();
-    // The last has only the name of one.
-    let text = b"{\"parameterization\": 2}\n";
-    for content in [b"", &whole[..3], &whole[..whole.len() / 2], &whole[..whole.len() - 1], text] {
-        std::fs::write(&path, content).unwrap();
-        let (code, text) = said(dir.path(), "study --scenarios s.parquet");
-        assert!(code == 3 && text.contains("s.parquet: not a Parquet file that can be read"), "{text}");
-        assert!(text.contains("help: write the file again, or use JSON Lines or CSV"), "{text}");
-        assert!(!text.contains("panicked"), "{text}");
-    }
-}

@@ -32,12 +32,17 @@ fn each_track(change: impl Fn(&mut Track)) -> Recording {
 }
 
 /// What good recordings must not be told.
-const WORDS: [&str; 9] = [
+const WORDS: [&str; 14] = [
     "half extents",
+    "none is longer",
+    "have another unit or scale",
+    "s late against positions",
     "is usual): check the scale",
     "half widths",
     "lane marking at y",
     "times as far as their speeds",
+    "were clipped",
+    "are multiples of",
     "no vehicle drives between",
     "less than 1 m apart",
     "are swapped",
@@ -71,15 +76,27 @@ fn faults_of_a_recording_are_told() {
         let half_m = if of.carriageway == 0 { of.width_m / 2.0 } else { 0.0 };
         each(&mut of.d_m, |d_m| *d_m -= half_m);
     };
-    let tracks: [(Change, Option<bool>, &[&str]); 3] = [
+    // A filter delays positions across the road by a second; the speeds come from elsewhere.
+    let late = |of: &mut Track| of.d_m = (0..of.len()).map(|k| of.d_m[k.saturating_sub(25)]).collect();
+    let faster = |of: &mut Track, is: bool| each(&mut of.v_s_mps, |v| *v *= if is { 1.1 } else { 1.0 });
+    let tracks: [(Change, Option<bool>, &[&str]); 8] = [
         (&corner, Some(false), &["half widths to the right", "-forward: half"]),
+        (
+            &|of| each(&mut of.a_s_mps2, |a| *a = a.clamp(-2.0, 2.0)),
+            None,
+            &["no acceleration is below -2.0", "clipped"],
+        ),
+        (&|of| each(&mut of.a_s_mps2, |a| *a = a.min(0.5)), None, &["no acceleration is above 0.50", "clipped"]),
+        (&late, None, &["lateral speeds are -0."]),
         (&|of| (of.length_m, of.width_m) = (of.length_m / 2.0, of.width_m / 2.0), None, &["are these half extents?"]),
         (&|of| (of.length_m, of.width_m) = (of.width_m, of.length_m.min(9.9)), Some(false), &["are swapped"]),
+        (&|of| of.length_m = of.length_m.min(7.5), None, &["most lorries are 7.50 m long, and none is longer"]),
+        (&|of| faster(of, of.class == VehicleClass::Truck), None, &["lorries: vehicles move 0.909 times"]),
     ];
     type Whole<'a> = (&'a dyn Fn(&mut Recording), &'a [&'a str]);
     let all: [Whole; 3] = [
-        (&|of| of.frame_rate_hz = 25.9, &["vehicles move 1.036", "frame rate: 25.0 Hz would fit"]),
-        (&|of| of.frame_rate_hz = 24.0, &["vehicles move 0.96", "frame rate: 25.0 Hz would fit"]),
+        (&|of| of.frame_rate_hz = 25.9, &["vehicles move 1.036", "frame rate: 25.0 Hz would fit", "-s late"]),
+        (&|of| of.frame_rate_hz = 24.0, &["vehicles move 0.96", "frame rate: 25.0 Hz would fit", "-s late"]),
         (&split_a_lorry, &["1 pair(s) of vehicles drive less than 1 m apart"]),
     ];
     let tracks = tracks.map(|(change, is_usable, told)| (each_track(change), is_usable, told));
@@ -93,11 +110,22 @@ fn faults_of_a_recording_are_told() {
         }
         assert!(is_usable.is_none_or(|is| is == about.is_usable()), "{told:?}: {:?}", about.findings);
     }
+    for (carriageway, way) in [(0, "backward"), (1, "forward")] {
+        let about = highd_understood(&each_track(|of| faster(of, of.carriageway == carriageway)));
+        let is_told = says(&about, &format!("{way}: vehicles move 0.909 times"));
+        assert!(is_told || !about.is_usable(), "{way}: {:?}", about.findings);
+    }
 }
 
-/// A road in Web Mercator at 51 degrees: without speeds nothing else tells the scale.
+/// Positions in whole metres, and a road in Web Mercator at 51 degrees: without speeds nothing else tells the scale.
 #[test]
-fn stretched_roads_are_told() {
+fn coarse_positions_and_stretched_roads_are_told() {
+    for (raster_m, is_coarse) in [(1.0, true), (0.1, false)] {
+        let mut table = Plain::of(&generated(), 1);
+        table.map("x", |x, _| (x / raster_m).round() * raster_m);
+        let about = understood(&table, &|_| ()).unwrap();
+        assert_eq!(says(&about, "are multiples of 1.00 m"), is_coarse, "{raster_m}: {:?}", about.findings);
+    }
     let mut table = Plain::of(&generated(), 5).without(&["speed", "vx", "vy"]);
     ["x", "y"].iter().for_each(|axis| table.map(axis, |m, _| 1.589 * m));
     let about = understood(&table, &|_| ()).unwrap();

@@ -278,10 +278,12 @@ fn lorries_beside_the_middle_of_their_lanes_are_no_edge_for_either_reader() {
 #[test]
 fn columns_that_contradict_each_other_in_part_are_noted() {
     type Change<'a> = &'a dyn Fn(usize, &mut Track);
-    let cases: [(Change, &str); 3] = [
+    let cases: [(Change, &str); 5] = [
         (&|at, track| track.a_s_mps2.iter_mut().for_each(|a| *a *= (at % 2) as f64), "times the changes of speed"),
         (&|_, track| track.a_s_mps2.iter_mut().for_each(|a| *a = a.max(0.0)), "times the changes of speed"),
         (&|_, track| track.v_d_mps.iter_mut().for_each(|v| *v /= 1.3), "as far across the road"),
+        (&|_, track| (10..track.len()).rev().for_each(|k| track.v_s_mps[k] = track.v_s_mps[k - 10]), "s late against"),
+        (&|_, track| track.length_m = 4.5, "are not longer than cars"),
     ];
     for (change, expected) in cases {
         let mut recording = shorter();
@@ -292,7 +294,7 @@ fn columns_that_contradict_each_other_in_part_are_noted() {
         // The table has no accelerations.
         assert!(table.is_usable() && (expected.starts_with("times") || says(&table, expected)), "{:?}", table.findings);
     }
-    let kinds = ["times the changes", "across the road"];
+    let kinds = ["times the changes", "late against", "across the road", "not longer than cars"];
     let plain = by_both_readers(&shorter());
     assert!(plain.iter().all(|about| kinds.iter().all(|kind| !says(about, kind))), "{plain:?}");
 }

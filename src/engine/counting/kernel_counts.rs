@@ -98,6 +98,11 @@ impl KernelCounts {
         self.samples.len()
     }
 
+    /// Number of groups and of counts.
+    pub(super) fn shape(&self) -> [usize; 2] {
+        [self.samples.len(), self.failures.len()]
+    }
+
     /// Lanes and failed lanes over some cells (headway × model × criterion), group by group.
     pub fn over(&self, cells: &[usize]) -> (Vec<u64>, Vec<u64>) {
         let groups = self.samples.len();
@@ -108,8 +113,7 @@ impl KernelCounts {
 }
 
 /// Serializes counts as base-32 digits, the most significant first. The last digit of a number is a lower-case letter
-/// or a digit, the others are capital letters. Most counts of a journal's record are one character: a tenth of the time
-/// of a list of numbers, and a third of the size.
+/// or a digit, the others are capital letters. Most counts of a journal's record are one character.
 pub(crate) mod packed {
     use serde::de::Error as _;
     use serde::{Deserialize, Deserializer, Serializer};

@@ -189,6 +189,9 @@ impl SampleTally {
             let problem = format!("it belongs to plan {}, not to {}", other.plan_sha256, self.plan_sha256);
             return Err(Error::input(place(), problem, "join only parts of one run: same density, flags and seed"));
         }
+        if self.shape() != other.shape() {
+            return Err(Error::input(place(), "the parts have other models or headways", "make the part again"));
+        }
         let mut covered = std::mem::take(&mut self.covered);
         covered.extend(other.covered.iter().cloned());
         covered.sort_by_key(|range| range.start);
@@ -206,6 +209,12 @@ impl SampleTally {
         self.covered = joined;
         self.add(&other);
         Ok(self)
+    }
+
+    /// Sizes of the lists of counts, which follow from models, headways and criteria.
+    fn shape(&self) -> [usize; 5] {
+        let [groups, counts] = self.by_kernel.as_ref().map_or([0, 0], KernelCounts::shape);
+        [self.failures.len(), self.squares.len(), self.capped.len(), groups, counts]
     }
 
     /// The samples counted, as disjoint intervals, ascending.

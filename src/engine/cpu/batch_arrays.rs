@@ -292,7 +292,7 @@ impl LaneArrays<1> {
             leaves_from: [leaves_from],
         };
         let mut lane = LaneArrays { fixed: FixedArrays { ego, others: [other(0), other(1)] }, ..LaneArrays::idle() };
-        // A set that keeps everything.
+        // Rules of two vehicles with all values: every row is written.
         lane.state.set::<M>(0, state, Rules::ALL[1]);
         lane
     }

@@ -185,8 +185,9 @@ impl LaneRunner<'_, f32> {
 }
 
 impl LaneRunner<'_, f32> {
-    /// Runs all lanes of some units of a block in batches if they [run so](LaneRunner::runs_in_batches), except those of drivers outside the registry; passes the position, counted from the first unit, and the
-    /// result. The order is unspecified.
+    /// Runs all lanes of some units of a block in batches, except those of drivers outside the registry. The lanes must
+    /// [run in batches](LaneRunner::runs_in_batches). Passes the position, counted from the first unit, and the result, in
+    /// any order.
     pub(super) fn run_units<E: Ending>(
         &self,
         instructions: Instructions,

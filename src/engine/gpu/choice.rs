@@ -46,8 +46,8 @@ fn named<'a>(cards: &'a [AdapterCard], device: &str) -> Result<&'a AdapterCard> 
     Ok(first)
 }
 
-/// All matching cards, the preferred interface first: by their position, by a part of the PCI bus id as tools print it
-/// (`nvidia-smi` writes `00000000:65:00.0`), or by a part of the name. A complete name has priority: `NVIDIA L4` does not
+/// All matching cards, the preferred interface first: by their position, by the PCI bus id with or without its
+/// domain (`nvidia-smi` writes `00000000:65:00.0`), or by a part of the name. A complete name has priority: `NVIDIA L4` does not
 /// match `NVIDIA L40`.
 fn matching<'a>(cards: &'a [AdapterCard], device: &str) -> Vec<&'a AdapterCard> {
     let device = device.trim().to_lowercase();
@@ -56,7 +56,11 @@ fn matching<'a>(cards: &'a [AdapterCard], device: &str) -> Vec<&'a AdapterCard> 
         return such(&|card| card.index == index);
     }
     if let Some(bus) = device.strip_prefix("pci:") {
-        let is_at = |own: &String| !bus.is_empty() && (own.ends_with(bus) || bus.ends_with(own));
+        // The domain may be missing, or have more zeros.
+        let is_at = |own: &String| {
+            let is_same = bus.trim_start_matches('0') == own.trim_start_matches('0');
+            bus.contains(':') && (is_same || own.ends_with(&format!(":{bus}")))
+        };
         return such(&|card| card.pci_bus_id.as_ref().is_some_and(is_at));
     }
     let complete = such(&|card| card.name.to_lowercase() == device);
@@ -228,7 +232,7 @@ mod tests {
 
     #[test]
     fn a_name_of_nothing_lists_the_devices() {
-        for device in ["radeon", "6", "pci:aa:00.0", "pci:", ""] {
+        for device in ["radeon", "6", "pci:aa:00.0", "pci:5:00.0", "pci:00.0", "pci:0", "pci:", ""] {
             let error = choose(&workstation(), BackendChoice::Auto, Some(device)).unwrap_err();
             assert!(matches!(error, Error::Usage { .. }));
             let text = says(error);

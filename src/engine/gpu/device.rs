@@ -118,7 +118,7 @@ pub(super) struct Device {
     pub max_made_bytes: u64,
     pub options: GpuOptions,
     pub tampering: Tampering,
-    /// Of each kernel's [`BINDINGS`].
+    /// One layout per entry of [`BINDINGS`].
     layouts: [wgpu::BindGroupLayout; 3],
     pipelines: Vec<Compiled>,
     trouble: Arc<Mutex<Option<String>>>,

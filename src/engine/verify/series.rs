@@ -110,7 +110,6 @@ impl ThresholdSeries {
         acceleration_mps2: f64,
         until_s: f64,
     ) -> Motion<f64> {
-        motion.kind &= LATERAL_SAMPLED;
         let speed = Speed::Kinematic { initial_mps: f64::from(initial_mps), acceleration_mps2, until_s };
         motion.set_speed(&speed, self.dt_s, &mut Tables::default());
         motion
@@ -118,7 +117,6 @@ impl ThresholdSeries {
 
     /// The same motion with another kinematic motion across the road.
     pub(super) fn with_lateral(&self, mut motion: Motion<f64>, lateral: &Lateral) -> Motion<f64> {
-        motion.kind &= SPEED_SAMPLED;
         motion.set_lateral(lateral, self.dt_s, &mut Tables::default());
         motion
     }

@@ -64,7 +64,8 @@ pub struct CaseNumber {
     pub axis_range: (f64, f64),
     /// Categories that have it.
     pub categories: &'static [Category],
-    /// A usual measurement error, SI units, with one more and one less in words; `None` for what is not varied.
+    /// A usual measurement error, SI units, and the words for adding and for subtracting it; `None` for what is not
+    /// varied.
     pub error: Option<(f64, [&'static str; 2])>,
 }
 

@@ -121,6 +121,7 @@ pub trait Job: Sized {
             Some(shard) => {
                 let folder = RunFolder::share(out)?;
                 let lock = FolderLock::acquire(&out.join(format!("{}.lock", shard.stem())))?;
+                warn_of_another_split(out, shard);
                 (folder, Some(lock))
             }
         };
@@ -172,6 +173,19 @@ pub trait Job: Sized {
 /// The units of a shard, or of the whole run.
 pub(crate) fn units_of(shard: Option<Shard>, count: u64) -> Range<u64> {
     shard.map_or(0..count, |shard| shard.units(count))
+}
+
+/// Parts of two splits overlap; this warns before the computation, not only at the merge.
+fn warn_of_another_split(out: &Path, ours: Shard) {
+    let names = std::fs::read_dir(out).into_iter().flatten().flatten();
+    let mut names = names.filter_map(|entry| entry.file_name().into_string().ok());
+    let is_other = |name: &String| {
+        let shard = name.strip_suffix(".json").and_then(Shard::of_stem);
+        shard.is_some_and(|shard| shard.of != ours.of)
+    };
+    if let Some(name) = names.find(is_other) {
+        tracing::warn!("{name} in this folder is of a run cut into another number of shards: they cannot be merged");
+    }
 }
 
 /// A job, or one of its shards, in a folder. It continues from the journal of an earlier process.

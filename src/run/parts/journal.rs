@@ -76,9 +76,13 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
                 remove_file(path)?;
                 return Ok((journal, Records { torn: true, ..found }));
             }
-            let other = || "this journal belongs to another run or another interval of it, or is damaged".to_owned();
-            let help = "move it away, or finish that run first: give the command that it was begun with";
-            let problem = check_begin(KINDS[0], &begin).err().unwrap_or_else(other);
+            let (problem, help) = match check_begin(KINDS[0], &begin) {
+                Err(problem) => (problem, "move it away; what it holds is then computed again"),
+                Ok(()) => (
+                    "this journal belongs to another run or another interval of it, or is damaged".to_owned(),
+                    "move it away, or finish that run first: give the command that it was begun with",
+                ),
+            };
             return Err(Error::input(Place::file(path), problem, help));
         }
         let mut whole = begin.len() as u64;

@@ -16,7 +16,7 @@ pub trait MergeableCounts: Sized + Clone + Serialize + DeserializeOwned {
     /// Merges the counts of both sets.
     ///
     /// # Errors
-    /// If a unit is in both, or the plans differ.
+    /// If a unit is in both. Only counts of one run are joined: journal and part hold its hash.
     fn join(self, other: Self) -> Result<Self>;
 }
 
@@ -65,7 +65,7 @@ impl<T: MergeableCounts> Ledger<T> {
     /// Takes over the records of a journal and continues it. Returns the number of units that need not be computed.
     ///
     /// # Errors
-    /// [`Error::Internal`] for counts that this program did not write.
+    /// [`Error::Internal`] for units outside of the interval.
     pub fn resume(&mut self, journal: CountsJournal<T>, found: Records<Counted<T>>) -> Result<u64> {
         if found.torn {
             tracing::warn!("{}: the last record is not whole; it is computed again", journal.path().display());

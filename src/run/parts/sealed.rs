@@ -14,7 +14,7 @@ use lanesweep_support::input_file::open;
 use lanesweep_support::plain_text::hex;
 use lanesweep_support::{Error, Place, Result};
 
-const VERSION: u64 = 3;
+const VERSION: u64 = 4;
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -67,7 +67,7 @@ pub fn unseal<T: DeserializeOwned>(kind: &str, text: &[u8], place: &Place, again
     Ok((content, sealed.sha256))
 }
 
-/// Reads a sealed file of at most `max_bytes` bytes. Other, truncated and longer files are not read as a whole.
+/// Reads a sealed file of at most `max_bytes` bytes. What follows the first line of a file is not read.
 ///
 /// # Errors
 /// [`Error::Io`]; as [`unseal`].
@@ -142,7 +142,9 @@ pub fn read_sealed_line<T: DeserializeOwned>(
     let wrong = |problem: String| Error::input(Place::file(path), problem, again);
     check_begin(kind, file.fill_buf().map_err(io)?).map_err(wrong)?;
     let line = json_line(&mut file, max_bytes).map_err(io)?;
-    let line = line.ok_or_else(|| wrong(format!("this is no whole {kind}: its first line has no end")))?;
+    let line = line.ok_or_else(|| {
+        wrong(format!("this is no whole {kind}: its first line has no end, or is longer than {max_bytes} bytes"))
+    })?;
     let (content, sha256) = unseal(kind, &line, &Place::file(path), again)?;
     Ok((content, sha256, file))
 }

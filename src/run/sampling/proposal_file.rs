@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use lanesweep_stats::density::{DensityModel, MAX_FILE_BYTES, Mixture};
 use lanesweep_support::{Error, Place, Result, input_file};
 
-const VERSION: u64 = 1;
+const VERSION: u64 = 2;
 
 const HOW_TO_REMAKE: &str = "write it again by `sample --estimator is`";
 

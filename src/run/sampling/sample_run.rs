@@ -107,6 +107,9 @@ impl Job for Sample {
     }
 
     fn write_plan(&self, out: &Path) -> Result<()> {
+        if matches!(self.kind, SampleKind::Search(_)) {
+            return Err(not_searched());
+        }
         let text = self.plan_file()?.0;
         leave_plan(out, &text, |file| file.write_all(&text))
     }

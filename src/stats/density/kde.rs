@@ -57,8 +57,8 @@ impl Kde {
     /// An estimate with known scale and bandwidth.
     ///
     /// # Errors
-    /// [`Error::Input`] if lengths differ, there is no point, or a number of a point is not finite. Scales and bandwidth
-    /// are above 0.
+    /// [`Error::Input`] if lengths differ, there is no point, or a number of a point is not finite. The caller
+    /// ensures that scales and bandwidth are above 0.
     pub fn from_parts(points: Vec<Vec<f64>>, scale: Vec<f64>, bandwidth: Bandwidth) -> Result<Kde> {
         if points.is_empty() {
             return Err(Error::input(Place::item("density"), "has no kernel", "fit it again"));

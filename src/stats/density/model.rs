@@ -176,7 +176,9 @@ impl DensityModel {
     pub fn at_bandwidth(&self, value: f64) -> Result<DensityModel> {
         let kde = self.kde.at_bandwidth(value);
         let valid = ValidFraction::count(&kde, &self.space, VALID_FRACTION_DRAWS, self.valid.seed)?;
-        Ok(DensityModel { kde, valid, scenarios: Vec::new(), ..self.clone() })
+        let (space, sizes, exposure, provenance) =
+            (self.space.clone(), self.sizes, self.exposure, self.provenance.clone());
+        Ok(DensityModel { space, kde, valid, sizes, exposure, provenance, scenarios: Vec::new() })
     }
 
     /// Kind of scenario.

@@ -7,6 +7,7 @@
 use std::ops::RangeInclusive;
 use std::path::Path;
 
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
@@ -53,7 +54,8 @@ struct File {
     bandwidth: Bandwidth,
     p_valid: ValidFraction,
     exposure: Option<Exposure>,
-    /// Null: earlier versions compared drawn with unseen scenarios.
+    /// Always null; earlier versions had figures here.
+    #[serde(default)]
     representativeness: (),
     /// Means over the scenarios, because sizes are not parameters.
     sizes: Sizes,
@@ -243,9 +245,14 @@ fn check_version(text: &[u8], place: &Place) -> Result<()> {
     #[derive(Deserialize)]
     struct Version {
         lanesweep_density: Option<serde_json::Value>,
+        // What only files of earlier versions hold.
+        mixture: Option<IgnoredAny>,
+        representativeness: Option<IgnoredAny>,
     }
-
     let version: Version = serde_json::from_slice(text).map_err(|e| broken(place, &e))?;
+    if version.mixture.is_some() || version.representativeness.is_some() {
+        return Err(Error::input(place.clone(), "a density of an earlier version of lanesweep", REFIT));
+    }
     match version.lanesweep_density {
         Some(value) if value.as_u64() == Some(VERSION) => Ok(()),
         Some(value) => Err(Error::input(

@@ -63,10 +63,14 @@ impl ValidFraction {
         // A bound that depends on the draw (v1 < v0) is reported by its parameter only.
         let by =
             |invalid: Invalid| (invalid.parameter, invalid.bound.split(" = ").next().unwrap_or_default().to_owned());
-        let broken: Vec<(String, String)> = (0..draws).into_par_iter().filter_map(broken).map(by).collect();
-        let valid = draws - broken.len() as u64;
-        let mut counts = BTreeMap::<_, u64>::new();
-        broken.into_iter().for_each(|by| *counts.entry(by).or_default() += 1);
+        // Counted in each thread, because most of 10⁹ draws may be invalid.
+        let add = |mut counts: BTreeMap<(String, String), u64>, (by, draws): ((String, String), u64)| {
+            *counts.entry(by).or_default() += draws;
+            counts
+        };
+        let counts = (0..draws).into_par_iter().filter_map(broken).map(|invalid| (by(invalid), 1));
+        let counts = counts.fold(BTreeMap::new, add).reduce(BTreeMap::new, |a, b| b.into_iter().fold(a, add));
+        let valid = draws - counts.values().sum::<u64>();
         if valid == 0 {
             return Err(Error::input(
                 Place::item("density"),

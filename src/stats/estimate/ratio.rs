@@ -156,7 +156,7 @@ impl Ratio {
         self.verdict == RatioVerdict::Agrees
     }
 
-    /// A paired interval may lie within the margin; a separate one does not tell agreement.
+    /// A paired interval may lie within the margin; only it can show agreement.
     fn new(ratio: f64, [low, high]: [f64; 2], method: RatioMethod) -> Ratio {
         let finite = |v: f64| v.is_finite().then_some(v);
         let verdict = match method {

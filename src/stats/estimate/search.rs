@@ -164,8 +164,8 @@ impl Question {
         !self.is_settled && !self.is_given_up
     }
 
-    /// Searches on if the proposal is refused, but not for ever.
-    fn reopens(&mut self, is_refused: bool) -> bool {
+    /// Reopens the question if its proposal is refused, at most [`MAX_REFUSALS`] times; returns whether it did.
+    fn reopen_if(&mut self, is_refused: bool) -> bool {
         let reopens = is_refused && self.refusals < MAX_REFUSALS;
         self.refusals += usize::from(reopens);
         self.is_settled &= !reopens;
@@ -400,7 +400,7 @@ impl<'a> Searching<'a> {
                 Found { probability, relative_variance: Some(variance).filter(|variance| variance.is_finite()) };
             let is_coarse = variance > GOOD_VARIANCE && question.refusals < MAX_REFINEMENTS;
             let is_refused = sum <= 0.0 || largest > MAX_FRACTION * sum || is_coarse;
-            goes_on |= question.reopens(is_refused);
+            goes_on |= question.reopen_if(is_refused);
         }
         let goes_on = goes_on || self.misses(&candidate, &settled)?;
         self.proposal = Some(candidate);
@@ -423,7 +423,7 @@ impl<'a> Searching<'a> {
             let thin = libm::log(THIN / (settled.len() as f64 * probability * self.nominal.validity_fraction()));
             let is_missed = |(point, log_ratio): &(&usize, &f64)| self.pool.fails(**point, at) && **log_ratio < thin;
             let missed = crude.iter().zip(&log_ratios).filter(is_missed).count() as f64 / self.crude.max(1) as f64;
-            goes_on |= self.questions[at].reopens(missed > MAX_THIN * probability);
+            goes_on |= self.questions[at].reopen_if(missed > MAX_THIN * probability);
         }
         Ok(goes_on)
     }

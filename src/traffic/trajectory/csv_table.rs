@@ -143,9 +143,12 @@ impl CsvTable {
     pub(super) fn column(&self, name: &str) -> Result<CsvColumn> {
         self.optional_column(name)?.ok_or_else(|| {
             let strange: Vec<String> = self.strange_names().take(10).map(quoted).collect();
+            let more = if self.strange_names().count() > strange.len() { ", …" } else { "" };
             let others = match strange.is_empty() {
                 true => String::new(),
-                false => format!("; the header has names that are not part of the format: {}", strange.join(", ")),
+                false => {
+                    format!("; the header has names that are not part of the format: {}{more}", strange.join(", "))
+                }
             };
             let help = match self.similar_name(name) {
                 Some(similar) => format!("rename the column `{similar}` to `{name}`, if that is what it holds"),

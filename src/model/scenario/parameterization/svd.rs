@@ -22,7 +22,7 @@ pub struct SvdBasis {
     pub weights: Vec<f64>,
     /// Mean of the weighted vectors.
     pub mean: Vec<f64>,
-    /// Right singular vectors, the first singular values' or all, each as long as z.
+    /// Right singular vectors, each as long as z: of all singular values, or of the first ones.
     pub directions: Vec<Vec<f64>>,
 }
 

@@ -1,18 +1,20 @@
 //! What contradicts itself in a recording: units, axes, motion.
 
-use super::offsets::slope_within;
+use super::offsets::{slope_within, way};
 use super::preset::{Preset, Side};
 use super::road::{median, range};
 use super::understanding::{Understanding, median_of};
 use crate::trajectory::motion::impossible;
 use crate::trajectory::{NO_LANE, Recording, Track, VehicleClass};
 use lanesweep_model::plausibility::{Doubts, Implausible, NOISE_MPS, Quantity};
-use lanesweep_support::readable::{significant, value};
+use lanesweep_support::readable::{count, significant, value};
 
 /// Positions and speeds that differ by more than this fraction do not belong together.
 const MAX_SPEED_DIFFERENCE: f64 = 0.05;
 /// Good data differ by less.
 const USUAL_DIFFERENCE: f64 = 0.02;
+/// Speeds that are later than positions by more than this are not theirs, s.
+const MAX_DELAY_S: f64 = 0.2;
 /// A speed that positions tell to vary by more is not constant, m/s.
 const MAX_RANGE_MPS: f64 = 2.0;
 /// Fraction of vehicles that cross the road by more than the distance (m) from which on it is no motorway.
@@ -22,6 +24,12 @@ const ACROSS_M: f64 = 15.0;
 const MIN_APART_M: f64 = 100.0;
 /// What goes farther back along the road drives backwards, m.
 const MAX_BACKWARD_M: f64 = 5.0;
+/// So many samples have the extreme acceleration, and their speeds change by so much more (m/s²), where it was clipped.
+const MIN_CLIPPED: usize = 20;
+const MIN_BEYOND_MPS2: f64 = 0.2;
+/// A raster of positions that is larger, and a larger fraction of the step from sample to sample, is coarse, m.
+const MIN_RASTER_M: f64 = 0.2;
+const MAX_RASTER: f64 = 0.25;
 /// Widths of the lanes of motorways, m.
 const USUAL_LANES_M: std::ops::RangeInclusive<f64> = 2.7..=4.6;
 /// Fewer vehicles prove nothing.
@@ -80,10 +88,11 @@ impl Understanding {
     /// Compares speeds with positions, and accelerations with speeds.
     pub(super) fn check_speeds(&mut self, recording: &Recording) {
         let seen = &mut self.seen;
+        let mut is_off = false;
         if !seen.ratios.is_empty() && seen.ratios.len() >= MIN_VEHICLES.min(recording.tracks.len()) {
             let (ratio, error) = median_and_error(&mut seen.ratios);
             seen.has_wrong_ratio = (ratio - 1.0).abs() > MAX_SPEED_DIFFERENCE;
-            let is_off = seen.has_wrong_ratio || (ratio - 1.0).abs() > USUAL_DIFFERENCE + 4.0 * error;
+            is_off = seen.has_wrong_ratio || (ratio - 1.0).abs() > USUAL_DIFFERENCE + 4.0 * error;
             let near = |(factor, _): &&(f64, &str)| (ratio / factor - 1.0).abs() < 0.06;
             // A rate that the times give is right.
             let by_rate = match seen.rate_is_of_times {
@@ -99,7 +108,19 @@ impl Understanding {
                 self.find(self.seen.has_wrong_ratio, text);
             }
         }
-        let told = self.seen.acceleration;
+        if !self.seen.has_wrong_ratio {
+            self.check_groups(recording);
+        }
+        let (delay, told) = (self.seen.delay, self.seen.acceleration);
+        for (of, name) in delay.into_iter().zip(["speeds", "lateral speeds"]) {
+            let is_late = of.slope().abs() > MAX_DELAY_S.max(4.0 * of.slope_error());
+            if is_late && !is_off && of.of_derived > 0.01 * of.count {
+                let by_s = significant(of.slope(), 2);
+                self.warn(format!(
+                    "{name} are {by_s} s late against positions: rows are shifted, or filters delay them"
+                ));
+            }
+        }
         // Below 0.1 m/s in a second there is nothing to compare.
         if told.count > 50.0 && told.of_given.max(told.of_derived) > 0.01 * told.count {
             let size = libm::sqrt(told.of_given / told.of_derived.max(1e-12));
@@ -117,6 +138,36 @@ impl Understanding {
                 self.warn(format!(
                     "accelerations are {times} times the changes of speed (0.75 to 1.25 is usual): check whether they are missing for some vehicles, for braking, or have another sign in one direction; without the column they follow from speeds"
                 ));
+            }
+        }
+    }
+
+    /// Compares speeds with positions of each direction and class, of which another's may hide what is wrong.
+    fn check_groups(&mut self, recording: &Recording) {
+        let groups = (0..recording.carriageways.len()).map(|at| (Some(at), None));
+        let groups = groups.chain([VehicleClass::Car, VehicleClass::Truck].map(|class| (None, Some(class))));
+        for (carriageway, class) in groups {
+            let is_in = |of: &&Track| {
+                carriageway.is_none_or(|at| of.carriageway == at) && class.is_none_or(|class| of.class == class)
+            };
+            let ratio = |of: &Track| {
+                let driven_m =
+                    of.v_s_mps.windows(2).map(|v| 0.5 * (v[0] + v[1])).sum::<f64>() / recording.frame_rate_hz;
+                (driven_m > 20.0).then(|| (of.s_m[of.len() - 1] - of.s_m[0]) / driven_m)
+            };
+            let mut ratios: Vec<f64> = recording.tracks.iter().filter(is_in).filter_map(ratio).collect();
+            if ratios.len() < MIN_VEHICLES {
+                continue;
+            }
+            let (ratio, error) = median_and_error(&mut ratios);
+            if (ratio - 1.0).abs() > MAX_SPEED_DIFFERENCE + 4.0 * error {
+                let who = match (carriageway, class) {
+                    (Some(at), _) => way(&recording.carriageways[at]),
+                    (_, Some(VehicleClass::Truck)) => "lorries",
+                    _ => "cars",
+                };
+                let times = significant(ratio, 3);
+                self.warn(format!("{who}: vehicles move {times} times as far as their speeds tell: the speeds of some vehicles have another unit or scale"));
             }
         }
     }
@@ -162,6 +213,20 @@ impl Understanding {
             if !quantity.is_plausible(middle) {
                 self.refuse(format!("the median vehicle: {}", quantity.describe(middle)));
             }
+        }
+        self.check_sizes(recording);
+        let length_of = |class: VehicleClass| {
+            let mut lengths: Vec<f64> =
+                recording.tracks.iter().filter(|of| of.class == class).map(|of| of.length_m).collect();
+            (lengths.len() >= MIN_VEHICLES).then(|| median(&mut lengths))
+        };
+        if let Some((car_m, lorry_m)) = length_of(VehicleClass::Car).zip(length_of(VehicleClass::Truck))
+            && lorry_m <= car_m
+        {
+            let (car_m, lorry_m) = (significant(car_m, 3), significant(lorry_m, 3));
+            self.warn(format!(
+                "lorries of {lorry_m} m are not longer than cars of {car_m} m: check classes and lengths"
+            ));
         }
         let mut widths_m: Vec<f64> = recording
             .carriageways
@@ -214,6 +279,29 @@ impl Understanding {
             self.refuse(format!(
                 "{vehicles} vehicle(s) have samples that cannot be, the first is {first}; correct them, name the text that stands for no value in `none`, leave out the column, or smooth the positions (`smoothing_s`)"
             ));
+        }
+    }
+
+    /// Finds accelerations that end at a value beyond which the speeds beside them change, and coarse positions.
+    pub(super) fn check_resolution(&mut self, recording: &Recording) {
+        let rate_hz = recording.frame_rate_hz;
+        let inner = || recording.tracks.iter().flat_map(|of| (1..of.len().max(2) - 1).map(move |k| (of, k)));
+        for sign in [1.0, -1.0] {
+            let extreme = inner().map(|(of, k)| sign * of.a_s_mps2[k]).fold(0.0, f64::max);
+            let at = inner().filter(|(of, k)| sign * of.a_s_mps2[*k] == extreme);
+            let told: Vec<f64> =
+                at.map(|(of, k)| sign * (of.v_s_mps[k + 1] - of.v_s_mps[k - 1]) * rate_hz / 2.0).collect();
+            let told_mps2 = told.iter().sum::<f64>() / told.len() as f64;
+            if told.len() >= MIN_CLIPPED && told_mps2 > extreme + MIN_BEYOND_MPS2 {
+                let (side, number) = (if sign > 0.0 { "above" } else { "below" }, count(told.len() as u64));
+                let [extreme, told] = [extreme, told_mps2].map(|value| significant(sign * value, 2));
+                self.warn(format!("no acceleration is {side} {extreme} m/s², which {number} samples have, although their speeds change by {told} m/s² on average: they were clipped; without the column they follow from speeds"));
+            }
+        }
+        let coarse: Vec<f64> = recording.tracks.iter().filter_map(coarse_raster_m).collect();
+        if 2 * coarse.len() > recording.tracks.len() {
+            let raster = significant(median(&mut { coarse }), 3);
+            self.warn(format!("positions along the road are multiples of {raster} m, which is coarse for {} samples per second: gaps, and speeds from positions, are as coarse", value(rate_hz)));
         }
     }
 
@@ -317,6 +405,17 @@ impl Understanding {
         }
         self.warn_of(noise, &format!("speeds below 0 count as 0; the lowest is {} m/s", value(lowest)));
     }
+}
+
+/// The raster that all steps of a track along the road are multiples of, m; `None` if it is fine against the usual step, or
+/// nothing tells it because all steps are equal.
+fn coarse_raster_m(track: &Track) -> Option<f64> {
+    let mut steps_m: Vec<f64> = track.s_m.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
+    let (_, high_m) = range(steps_m.iter().copied());
+    let raster_m = steps_m.iter().copied().filter(|step_m| *step_m > 1e-6).fold(f64::INFINITY, f64::min);
+    let is_on = |step_m: &f64| (step_m / raster_m - (step_m / raster_m).round()).abs() < 1e-6;
+    let is_coarse = raster_m > MIN_RASTER_M && raster_m > MAX_RASTER * median(&mut steps_m);
+    (is_coarse && high_m > 1.5 * raster_m && steps_m.iter().all(is_on)).then_some(raster_m)
 }
 
 /// The median and its standard error, from the quartiles.

@@ -22,6 +22,23 @@ const MAX_ALONE: f64 = 0.4;
 const BESIDE_M: f64 = 0.5;
 
 impl Understanding {
+    /// Finds lengths that end at one value.
+    pub(super) fn check_sizes(&mut self, recording: &Recording) {
+        let mut lengths: Vec<f64> =
+            recording.tracks.iter().filter(|of| of.class == VehicleClass::Truck).map(|of| of.length_m).collect();
+        lengths.sort_by(f64::total_cmp);
+        let longest_m = lengths.last().copied().unwrap_or(0.0);
+        let others = lengths.iter().filter(|length_m| **length_m < longest_m).count();
+        let distinct = lengths.chunk_by(|a, b| a == b).count();
+        // Simulated lorries have a few lengths, measured ones many, of which the largest is one's alone.
+        if lengths.len() - others > others.max(MIN_VEHICLES) && distinct > 2 {
+            self.warn(format!(
+                "most lorries are {} m long, and none is longer: were lengths cut off there?",
+                significant(longest_m, 3)
+            ));
+        }
+    }
+
     /// Compares where vehicles drive across the road in the parts of a recording.
     pub(super) fn check_parts(&mut self, recording: &Recording) {
         for (at, carriageway) in recording.carriageways.iter().enumerate() {

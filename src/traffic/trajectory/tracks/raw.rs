@@ -273,6 +273,8 @@ fn add_vehicle_facts(
     let by_number: HashMap<u64, &Facts> = facts.iter().filter_map(|(key, of)| Some((number(key)?, of))).collect();
     for recording in recordings {
         let mut unknown: Vec<&str> = Vec::new();
+        let places = recording.classes.iter().cloned().enumerate().map(|(at, class)| (class, at));
+        let mut places: HashMap<String, usize> = places.collect();
         for RawVehicle { key, samples } in &mut recording.vehicles {
             let known = facts.get(key).or_else(|| by_number.get(&number(key)?).copied());
             let Some((class, numbers)) = known else {
@@ -281,7 +283,7 @@ fn add_vehicle_facts(
             };
             let classes = &mut recording.classes;
             let class = class.as_ref().map(|class| {
-                let at = classes.iter().position(|known| known == class).unwrap_or_else(|| {
+                let at = *places.entry(class.clone()).or_insert_with(|| {
                     classes.push(class.clone());
                     classes.len() - 1
                 });

@@ -50,6 +50,9 @@ pub(super) struct Seen {
     pub ratios: Vec<f64>,
     /// Speeds and positions do not belong together, which names the unit that is wrong.
     pub has_wrong_ratio: bool,
+    /// Derived speeds minus given ones, and the accelerations of the given ones: the slope is by how much they are late, s.
+    /// Along and across the road.
+    pub delay: [Comparison; 2],
     /// Given lateral speeds and derived ones.
     pub lateral: Comparison,
     /// Given accelerations over a second and the changes of speed.
@@ -163,11 +166,18 @@ impl Understanding {
             if driven_m.abs().max(moved_m.abs()) > 20.0 {
                 self.seen.ratios.push(moved_m / driven_m.abs().max(0.1));
             }
+            let reach = (rate_hz / 2.0).round().max(1.0) as usize;
+            let change = |of: &[f64], k: usize| (of[k + reach] - of[k - reach]) * rate_hz / (2 * reach) as f64;
+            for k in (reach..s_m.len().saturating_sub(reach)).step_by(reach) {
+                self.seen.delay[0].add(change(s_m, k) - given[k], change(given, k));
+            }
         }
         if let Some(given) = given_d {
             let reach = (rate_hz / 5.0).round().max(1.0) as usize;
+            let change = |of: &[f64], k: usize| (of[k + reach] - of[k - reach]) * rate_hz / (2 * reach) as f64;
             for k in (reach..d_m.len().saturating_sub(reach)).step_by(reach) {
-                self.seen.lateral.add(given[k], (d_m[k + reach] - d_m[k - reach]) * rate_hz / (2 * reach) as f64);
+                self.seen.lateral.add(given[k], change(d_m, k));
+                self.seen.delay[1].add(change(d_m, k) - given[k], change(given, k));
             }
         }
     }
@@ -191,6 +201,7 @@ impl Understanding {
         self.check_units(recording);
         self.leave_out_backwards(recording);
         self.check_motion(recording);
+        self.check_resolution(recording);
         self.check_axes(recording, preset);
         self.check_boxes(recording);
         self.check_parts(recording);
