@@ -67,7 +67,7 @@ pub(super) struct Simulate {
     /// PDF of it.
     #[arg(long, value_name = "FILE.svg", help_heading = "Output")]
     plot: Option<PathBuf>,
-    /// End of the figure's time axis [default: 2 s after the last change]
+    /// End of the figure's time axis [default: 2 s after the last decisive event]
     #[arg(long, value_name = "s", requires = "plot", value_parser = time_s, help_heading = "Output")]
     plot_end: Option<f64>,
     #[command(flatten)]

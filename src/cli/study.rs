@@ -60,7 +60,7 @@ pub(super) struct Study {
     /// Figures with their texts, or plain ones for a paper: 88 or 180 mm wide, the texts in NAME.txt
     #[arg(long, value_name = "STYLE", value_enum, default_value = "titled", help_heading = "Output")]
     figures: Figures,
-    /// Set the paper's published numbers (of highD) beside ours: on the page and in run.json
+    /// Set the paper's published numbers (of highD) beside ours on the page; run.json has the differences
     #[arg(long, help_heading = "Models and criteria")]
     published: bool,
     #[command(flatten)]

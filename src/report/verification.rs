@@ -73,9 +73,15 @@ pub fn record(comparison: &Comparison, dt_s: f64) -> impl Serialize + use<> {
     }
 }
 
-/// How a lane ended on the CPU and on the device, with all digits, because a difference may be in the last one.
+/// How a lane ended on the CPU and on the device, with all digits, because a difference may be in the last one. The line
+/// above names every word that differs: −0, and the speeds of a contact that did not happen, show no ≠.
 fn lane(DifferingLane { key, cpu, tested }: &DifferingLane, dt_s: f64) -> String {
-    let [cpu, tested] = [cpu, tested].map(|outcome| outcome_record(outcome, dt_s));
+    let [cpu, tested] = [cpu, tested].map(|outcome| {
+        let mut record = outcome_record(outcome, dt_s);
+        record.insert("contact_with".to_owned(), outcome.contact_with.into());
+        record.insert("end".to_owned(), format!("{:?}", outcome.end).into());
+        record
+    });
     let rows = Table::of(cpu.iter().zip(tested.values()))
         .column("value", |((name, _), _)| name.as_str())
         .column("CPU, f32", |((_, cpu), _)| NumberText(cpu.to_string()))

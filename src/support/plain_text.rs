@@ -93,8 +93,8 @@ pub fn shown_json(json: &str) -> Cow<'_, str> {
     escaped(json, &['\n'], |c| format!("\\u{:04x}", u32::from(c)))
 }
 
-/// Escapes a text for HTML and XML 1.0, as content or attribute. Other acting characters, and those that XML never allows, become
-/// U+FFFD.
+/// Escapes a text for HTML and XML 1.0, as content or attribute. Tabs and carriage returns become references.
+/// Characters on which a browser acts, and those that XML never allows, become U+FFFD; a line break stays.
 pub fn escape_markup(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {

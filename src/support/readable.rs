@@ -29,7 +29,7 @@ pub fn value(value: f64) -> String {
     plain(value, DIGITS)
 }
 
-/// The same with at most this many digits.
+/// Formats a quantity with at most this many significant digits and without trailing zeros.
 pub fn plain(value: f64, digits: usize) -> String {
     let text = significant(value, digits);
     let (digits, power) = text.split_at(text.find('e').unwrap_or(text.len()));

@@ -15,7 +15,7 @@ use lanesweep_support::table::Table;
 pub struct TraceReport<'a>(pub &'a TracedLanes);
 
 impl TraceReport<'_> {
-    /// The lanes on one sheet, up to a time, s, or 2 s after the last change.
+    /// The lanes on one sheet, up to a time, s, or 2 s after the last decisive event.
     pub fn figure(&self, until_s: Option<f64>) -> TraceFigure<'_> {
         let (lanes, first) = (&self.0.lanes, &self.0.lanes[0]);
         let category = first.trace.category.label();

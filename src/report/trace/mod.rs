@@ -24,7 +24,7 @@ pub struct TraceFigure<'a> {
     pub subtitle: Option<String>,
     /// The lanes.
     pub series: Vec<TraceSeries<'a>>,
-    /// Last time shown, s; `None`: 2 s after the last change.
+    /// Last time shown, s; `None`: 2 s after the last decisive event, or the end if that is near.
     pub until_s: Option<f64>,
 }
 
@@ -93,7 +93,10 @@ impl TraceFigure<'_> {
             notes.push(format!("The lanes go on after {until} s, the longest to {end} s."));
             if self.until_s.is_none() {
                 notes.push(
-                    "Marks, changes of an ego's speed, and worst gap, TTC and BTN (to 5 %) come before.".to_owned(),
+                    "Before it are: every mark, every change of an ego's speed by more than 1 km/h, and the worst gap, TTC and \
+                     BTN (to 5 %, a gap to 1 cm). A TTC or BTN that stays ten times from its threshold is left out. Readings \
+                     of clauses may be later."
+                        .to_owned(),
                 );
             }
         }

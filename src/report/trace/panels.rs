@@ -309,7 +309,7 @@ impl<'a> Shown<'a> {
 }
 
 /// The last time at which a driver decides or is decided, s: marks, changes of its speed, and where gap, TTC and BTN come
-/// near their worst. A TTC or BTN that is never shown decides nothing.
+/// near their worst. A TTC above ten times its threshold, or a BTN below a tenth of it, decides nothing.
 fn decisive_s(trace: &Trace) -> f64 {
     let marks = StepMark::ALL.into_iter().filter_map(|mark| trace.step_of(mark)).map(|step| trace.time_s(step));
     let last_mps = trace.steps.last().map_or(0.0, |step| step.v_ego_mps);

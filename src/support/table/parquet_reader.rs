@@ -146,7 +146,11 @@ fn guarded<T, E: Display>(path: &Path, work: impl FnOnce() -> result::Result<T, 
 
 fn damaged(path: &Path, problem: impl Display) -> Error {
     let problem = format!("not a Parquet file that can be read: {problem}");
-    Error::input(Place::file(path), problem, "write the file again, or use JSON Lines or CSV")
+    Error::input(
+        Place::file(path),
+        problem,
+        "write the file again, with compression=\"zstd\", or use JSON Lines or CSV",
+    )
 }
 
 impl ParquetRows {
@@ -155,6 +159,13 @@ impl ParquetRows {
         // Use only Parquet's own types and ignore the Arrow schema of another program.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
         let metadata = guarded(path, || ArrowReaderMetadata::load(&file, options))?;
+        for field in metadata.schema().fields().iter().filter(|field| matches!(field.data_type(), DataType::Struct(_)))
+        {
+            let (file, name) = (Place::file(path), field.name());
+            tracing::warn!(
+                "{file}: the column `{name}` holds records, which are not read; write a column per field, like `{name}_v0`"
+            );
+        }
         let names = metadata.schema().fields().iter().map(|field| field.name().clone()).collect();
         let (path, wanted, batch) = (path.to_path_buf(), Vec::new(), Vec::new());
         Ok((names, ParquetRows { path, file, metadata, wanted, reader: None, batch, batch_rows: 0, at: 0, number: 0 }))
@@ -183,8 +194,8 @@ impl TableRows for ParquetRows {
             let name = self.metadata.schema().field(column).name();
             let problem = format!("holds values of the type {}", self.data_type(column));
             let help = format!(
-                "expected numbers, texts, truth values or lists of numbers; cast it: df[\"{name}\"].astype(\"float64\") in \
-                 pandas, pl.col(\"{name}\").cast(pl.Float64) in Polars; a time to int64, Int64"
+                "expected numbers, texts, truth values or lists of numbers; cast numbers: df[\"{name}\"].astype(\"float64\") in \
+                 pandas, pl.col(\"{name}\").cast(pl.Float64) in Polars; cast times to int64, and bytes to texts"
             );
             return Err(Error::input(Place::file(&self.path).column(name), problem, help));
         }

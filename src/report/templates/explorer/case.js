@@ -6,7 +6,7 @@ function sentence(name, { bits, contact, reaction, end, impact, closing, ttc, bt
   const collides = () => `and collides (${["", "side", "rear-end"][contact]} contact) at ${seconds(end)}, driving ${kmh(impact).toFixed(1)} km/h, closing in at ${kmh(closing).toFixed(1)} km/h`;
   const ends = bits & 1 ? collides() : bits & 8 ? "and has not collided when the run ends" : "and does not collide";
   const near = Number.isFinite(ttc) ? `smallest TTC ${seconds(ttc)}${bits & 2 ? ` (fails: below ${thresholds.ttc} s)` : ""}` : "no TTC";
-  const fails = bits & 4 ? ` (fails: ${btn > thresholds.btn ? `above ${thresholds.btn}` : "a contact"})` : "";
+  const fails = bits & 4 ? ` (fails: ${bits & 1 && !(btn > thresholds.btn) ? "a contact" : `above ${thresholds.btn}`})` : "";
   const braking = btn > 1 && !(bits & 1) ? "; a BTN above 1 does not contradict an avoided collision" : "";
   return `${name} ${reacts} ${ends}; ${near}, largest BTN ${Number.isFinite(btn) ? btn.toFixed(2) : "infinite"}${fails}${braking}.`;
 }

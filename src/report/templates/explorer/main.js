@@ -16,8 +16,8 @@ function describeState() {
   const held = panel ? `precomputed map ${panelWords(panel)}` : [kindOf().label, ...sliderParameters().map(value)].join(", ");
   document.querySelector("header p").textContent = `Cells that fail ${label} under ${state.profile}: ${held}; ${state.drivers.length ? `drivers ${state.drivers.join(", ")}` : "no driver"}.`;
   const other = data.grids.find((grid) => kindOfGrid(grid) === kindOf() && !isComputable({ grid }));
-  $("cases").textContent = panel ? (isComputable(panel) ? "" : `Cases unlike those of the sliders: ${difference(panel.grid)}. A moved slider shows a map of plain cases, with other counts.`)
-    : other ? `Plain cases. The precomputed maps have others: ${difference(other)}. Their counts differ.` : "";
+  $("cases").textContent = panel ? (isComputable(panel) ? "" : `Cases unlike those of the sliders: ${difference(panel.grid)}. A moved slider shows a map of plain cases; its counts may differ.`)
+    : other ? `Plain cases. A precomputed map has others: ${difference(other)}. Its counts may differ.` : "";
 }
 // Greys what the page shows while it computes what the state says; what is changed meanwhile is computed next.
 async function update() {
@@ -101,8 +101,8 @@ function buildControls() {
   choice($("panel"), [["", "none: computed here"], ...data.panels.map((panel, at) => [at, panelWords(panel)])], state.panel ?? "");
   for (const side of ["x", "y"]) {
     choice($(side), kindOf().parameters.map((parameter) => [parameter.key, parameter.label]), state[side].key);
-    const [{ from, to }, axis] = [parameterOf(state[side].key), state[side]];
-    const values = isPrecomputed() ? data.panels[state.panel].grid[side].values : axisValues(axis);
+    const [{ from, to }, axis, grid] = [parameterOf(state[side].key), state[side], isPrecomputed() ? data.panels[state.panel].grid : null];
+    const values = grid ? grid[side].values.map((value) => (sliderOf(grid, grid[side]) ? inUnit(grid, grid[side], value) : value)) : axisValues(axis);
     for (const [end, min, max, value] of [["from", from, axis.to, values[0]], ["to", axis.from, to, values.at(-1)], ["cells", 2, 400, values.length]]) {
       const input = Object.assign($(`${side}-${end}`), { min, max, value });
       input.onchange = () => { if (accepts(input)) { changed(() => { state[side] = axisOf(side, { ...axis, [end]: input.valueAsNumber }); }, false)(); } };
@@ -206,6 +206,6 @@ async function start() {
   const differing = await differingDrivers(settingOf());
   document.body.dataset.known = differing.join(",") || "equal";
   complain(differing.length ? `This device computes other bits than the program for ${differing.join(", ")} in 256 known runs: a verdict near a threshold may differ from the program's.`
-    : "Checked: 256 known runs end on this device as in the program, bit for bit: no sign that maps computed here differ from the program's.");
+    : "Checked: 256 known runs end on this device as in the program, bit for bit but for the value of the BTN: no sign that maps computed here differ from the program's.");
 }
 start();

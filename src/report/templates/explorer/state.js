@@ -55,8 +55,8 @@ function toAddress() {
 }
 // What a link asks for and the page does not show, in words; empty if nothing.
 function refused(asked) {
-  const shown = toAddress();
-  const differing = asked.filter(([key, value]) => shown.get(key) !== value && !(shown.has(key) && Number(shown.get(key)) === Number(value)));
+  const [shown, sorted] = [toAddress(), (text) => text?.split(",").sort().join()];
+  const differing = asked.filter(([key, value]) => sorted(shown.get(key)) !== sorted(value) && !(shown.has(key) && Number(shown.get(key)) === Number(value)));
   const word = (key) => ({ x: "across", y: "up", at: "chosen case" })[key] ?? key;
   const instead = ([key]) => (shown.has(key) || parameterOf(key) ? `${word(key)} ${shown.get(key) ?? valueOf(key)}` : `no ${word(key)}`);
   return differing.length ? `The link asks for ${differing.map(([key, value]) => `${word(key)} ${value}`.trim()).join(", ")}; shown is ${differing.map(instead).join(", ")}.` : "";
