@@ -115,7 +115,7 @@ fn a_best_parameterization_needs_ten_failing_scenarios() {
         let lane = |lane: u64| Verdicts(if plan.key(lane).unwrap().unit < failing { 7 } else { 0 });
         let counts = part(&plan, 0..60, &lane);
         let table = score(&plan, &counts, &ScoreOptions::default()).unwrap();
-        assert_eq!(table.categories[0].cells[0].f1_interval.is_none(), failing == 0, "an interval of nothing");
+        assert!(failing > 0 || table.categories[0].cells[0].f1_interval.is_none(), "an interval of nothing");
         let best = best_parameterizations(&table, &plan, &counts, Criterion::Collision).swap_remove(0);
         (best.failures, best.failing_scenarios, best.score.is_some(), best.data_for_decision)
     };
