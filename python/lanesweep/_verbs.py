@@ -44,9 +44,9 @@ __all__ = [
 
 
 class Case(TypedDict, total=False):
-    """Numbers of one case, as a mapping; the columns of a table of cases."""
+    """One case, as a mapping. A table of cases has these names as columns."""
 
-    category: str
+    category: Category
     """Kind of scenario: cut-in, cut-out, lvd."""
     ego_speed: Speed
     """Initial speed of the ego, with its unit: 60km/h."""
@@ -135,7 +135,7 @@ def study(
         observed: each scenario starts from its recorded gap, and a density draws the headway as one more parameter; it
         cannot be combined with other headways.
     published : bool
-        Set the paper's published numbers (of highD) beside ours: on the page and in run.json.
+        Set the paper's published numbers (of highD) beside ours on the page; run.json has the differences.
     models : Models
         Driver models: Reg157, CCHDM, RSS, FSM, by default all.
     profile : Path
@@ -681,9 +681,9 @@ def trace(
         Time step, by default the profile's.
     plot : Path
         Also draw the time series. Speed, acceleration, gap, TTC, BTN, PFS, CFS and lateral position, with reaction,
-        braking and contact.
+        braking and contact. `rsvg-convert` makes PNG and PDF of it.
     plot_end : Number, s
-        End of the figure's time axis, by default 2 s after the last change.
+        End of the figure's time axis, by default 2 s after the last decisive event.
     xosc : Path
         Also write ASAM OpenSCENARIO XML 1.2 with OpenDRIVE roads. Every lane becomes NNN-KEY.xosc and NNN-KEY.xodr in
         this folder; index.csv lists them with their outcomes. The other vehicles follow their own motion, step by step.

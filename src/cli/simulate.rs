@@ -63,8 +63,8 @@ pub(super) struct Simulate {
     compare: Vec<String>,
     /// Also draw the time series
     ///
-    /// Speed, acceleration, gap, TTC, BTN, PFS, CFS and lateral position, with reaction, braking and contact. `rsvg-convert` makes PNG and
-    /// PDF of it.
+    /// Speed, acceleration, gap, TTC, BTN, PFS, CFS and lateral position, with reaction, braking and contact. `rsvg-convert`
+    /// makes PNG and PDF of it.
     #[arg(long, value_name = "FILE.svg", help_heading = "Output")]
     plot: Option<PathBuf>,
     /// End of the figure's time axis [default: 2 s after the last decisive event]
