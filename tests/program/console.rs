@@ -88,13 +88,15 @@ fn every_answer_and_every_mistake_is_told_as_it_stands_in_the_messages() {
     // The README's second command tests a program without Parquet.
     let needs_parquet = |line: &str| line.starts_with("$ ") && line.contains(".parquet");
     assert!(!texts.iter().any(|text| std::fs::read_to_string(text).unwrap().lines().any(needs_parquet)));
-    // A panic in a thread of the pool would be printed with another test, or not at all.
+    // A panic in a thread of the pool would be printed with another test, or not at all. A pool of its own, because these
+    // threads wait for programs and sweeps in other tests would wait for them.
+    let pool = rayon::ThreadPoolBuilder::new().build().unwrap();
     let differences = texts.par_iter().filter_map(|text| {
         let dir = tempfile::tempdir().unwrap();
         crate::common::program::copy(&text.with_extension("in"), dir.path());
         difference(text, dir.path())
     });
-    let differences: Vec<String> = differences.collect();
+    let differences: Vec<String> = pool.install(|| differences.collect());
     assert!(differences.is_empty(), "{}", differences.join("\n\n"));
 }
 

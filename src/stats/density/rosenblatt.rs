@@ -17,24 +17,56 @@ impl Mixture {
     /// If `u` has another length than the mixture has parameters.
     pub fn from_standard_normal(&self, u: &[f64]) -> Vec<f64> {
         assert_eq!(u.len(), self.dimensions(), "a number for every parameter");
-        let kernels = self.weights().len();
-        // ln of the weight of each component given the parameters so far, and its standardized parameters.
-        let mut log_weights: Vec<f64> = self.weights().iter().map(|weight| libm::log(*weight)).collect();
-        let mut z = vec![vec![0.0; self.dimensions()]; kernels];
-        let mut point = Vec::with_capacity(u.len());
+        pulp::Arch::new().dispatch(Transform { mixture: self, u })
+    }
+}
+
+/// The transformation of one point. A type, because closures are not inlined into what is compiled for wider vectors.
+struct Transform<'a> {
+    mixture: &'a Mixture,
+    u: &'a [f64],
+}
+
+impl pulp::NullaryFnOnce for Transform<'_> {
+    type Output = Vec<f64>;
+
+    #[inline(always)]
+    fn call(self) -> Vec<f64> {
+        let Transform { mixture, u } = self;
+        let d = u.len();
+        // ln of the weight of each component given the parameters so far.
+        let mut log_weights = vec![0.0; mixture.weights().len()];
+        let mut weights = log_weights.clone();
+        let mut means = log_weights.clone();
+        let mut deviations = log_weights.clone();
+        for (log_weight, weight) in log_weights.iter_mut().zip(mixture.weights()) {
+            *log_weight = libm::log(*weight);
+        }
+        let mut point: Vec<f64> = Vec::with_capacity(d);
         for (j, &u) in u.iter().enumerate() {
             let top = log_weights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            let parts: Vec<[f64; 3]> = (0..kernels)
-                .map(|k| {
-                    let factor = self.factor(k);
-                    let shift: f64 = (0..j).map(|i| factor[(j, i)] * z[k][i]).sum();
-                    [libm::exp(log_weights[k] - top), self.mean(k)[j] + shift, factor[(j, j)]]
-                })
-                .collect();
-            let x = quantile(&parts, u);
-            for (k, [_, mean, deviation]) in parts.iter().enumerate() {
-                z[k][j] = (x - mean) / deviation;
-                log_weights[k] -= 0.5 * z[k][j] * z[k][j] + libm::log(*deviation);
+            for (weight, log_weight) in weights.iter_mut().zip(&log_weights) {
+                *weight = exp_minus(top - log_weight);
+            }
+            for run in &mixture.runs {
+                let factor = mixture.factor_of[run.start];
+                let deviation = mixture.factor(run.start)[(j, j)];
+                // Row j of L⁻¹: the component's (x − mean)/deviation is `before` + x/deviation − its whitened mean.
+                let row = &mixture.inverses[factor][j * (j + 1) / 2..];
+                let before: f64 = row.iter().zip(&point).map(|(l, x)| l * x).sum();
+                for k in run.clone() {
+                    means[k] = deviation * (mixture.whitened_means[k * d + j] - before);
+                }
+                deviations[run.clone()].fill(deviation);
+            }
+            let x = quantile(&weights, &means, &deviations, u);
+            for run in &mixture.runs {
+                let deviation = deviations[run.start];
+                let log_deviation = libm::log(deviation);
+                for k in run.clone() {
+                    let z = (x - means[k]) / deviation;
+                    log_weights[k] -= 0.5 * z * z + log_deviation;
+                }
             }
             point.push(x);
         }
@@ -43,21 +75,33 @@ impl Mixture {
 }
 
 /// x with Σ w Φ((x − mean)/deviation) = Φ(u) Σ w, from the tail in which u lies, so that far tails keep their digits.
-fn quantile(parts: &[[f64; 3]], u: f64) -> f64 {
-    let total: f64 = parts.iter().map(|[weight, ..]| weight).sum();
+#[inline(always)]
+fn quantile(weights: &[f64], means: &[f64], deviations: &[f64], u: f64) -> f64 {
+    let total: f64 = weights.iter().sum();
     let side = if u > 0.0 { -1.0 } else { 1.0 };
     let tail_of_u = normal_cdf(side * u);
     let wanted = libm::log(tail_of_u);
     // What all others together add to the tail is less than its rounding.
-    let negligible = 0.25 * f64::EPSILON * tail_of_u * total / parts.len() as f64;
-    let kept: Vec<[f64; 3]> = parts.iter().filter(|[weight, ..]| *weight > negligible).copied().collect();
-    let ends = kept.iter().map(|[_, mean, deviation]| mean + u * deviation);
-    let (mut low, mut high) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
-    let narrowest = kept.iter().map(|[.., deviation]| *deviation).fold(f64::INFINITY, f64::min);
-    let kernels: Vec<Kernels> = kept.chunks(LANES).map(Kernels::of).collect();
+    let negligible = 0.25 * f64::EPSILON * tail_of_u * total / weights.len() as f64;
+    let mut kernels: Vec<Kernels> = Vec::with_capacity(weights.len().div_ceil(LANES));
+    let mut lane = LANES;
+    let (mut low, mut high, mut narrowest) = (f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY);
+    for ((&weight, &mean), &deviation) in weights.iter().zip(means).zip(deviations) {
+        if weight > negligible {
+            if lane == LANES {
+                kernels.push(Kernels { weights: [0.0; LANES], means: [mean; LANES], deviations: [deviation; LANES] });
+                lane = 0;
+            }
+            let of = kernels.last_mut().expect("just pushed");
+            (of.weights[lane], of.means[lane], of.deviations[lane]) = (weight, mean, deviation);
+            lane += 1;
+            let end = mean + u * deviation;
+            (low, high, narrowest) = (low.min(end), high.max(end), narrowest.min(deviation));
+        }
+    }
     let mut x = 0.5 * (low + high);
     for _ in 0..STEPS {
-        let [tail, slope] = pulp::Arch::new().dispatch(Sums { kernels: &kernels, side, x });
+        let [tail, slope] = sums(&kernels, side, x);
         // ln of the tail is nearly linear where the tail is far.
         let off = libm::log(tail / total) - wanted;
         if off == 0.0 || high - low <= 4.0 * f64::EPSILON * x.abs().max(high.abs()) {
@@ -86,44 +130,21 @@ struct Kernels {
     deviations: [f64; LANES],
 }
 
-impl Kernels {
-    fn of(some: &[[f64; 3]]) -> Kernels {
-        let [_, mean, deviation] = some[0];
-        let mut of = Kernels { weights: [0.0; LANES], means: [mean; LANES], deviations: [deviation; LANES] };
-        for (lane, [weight, mean, deviation]) in some.iter().enumerate() {
-            (of.weights[lane], of.means[lane], of.deviations[lane]) = (*weight, *mean, *deviation);
-        }
-        of
-    }
-}
-
 /// The sum of the kernels below x (above it, if `side` is −1), and that of their densities there.
-struct Sums<'a> {
-    kernels: &'a [Kernels],
-    side: f64,
-    x: f64,
-}
-
-impl pulp::NullaryFnOnce for Sums<'_> {
-    type Output = [f64; 2];
-
-    #[inline(always)]
-    fn call(self) -> [f64; 2] {
-        let Sums { kernels, side, x } = self;
-        let (mut tails, mut slopes) = ([0.0; LANES], [0.0; LANES]);
-        for of in kernels {
-            for lane in 0..LANES {
-                let z = side * (x - of.means[lane]) / of.deviations[lane];
-                let bell = exp_minus(0.5 * z * z);
-                let inverse = 1.0 / (z.abs() + 4.0);
-                let beyond =
-                    bell * inverse * TAIL.iter().rev().fold(0.0, |sum, c| sum * ((z.abs() - 4.0) * inverse) + c);
-                tails[lane] += of.weights[lane] * if z > 0.0 { 1.0 - beyond } else { beyond };
-                slopes[lane] += of.weights[lane] * bell / of.deviations[lane];
-            }
+#[inline(always)]
+fn sums(kernels: &[Kernels], side: f64, x: f64) -> [f64; 2] {
+    let (mut tails, mut slopes) = ([0.0; LANES], [0.0; LANES]);
+    for of in kernels {
+        for lane in 0..LANES {
+            let z = side * (x - of.means[lane]) / of.deviations[lane];
+            let bell = exp_minus(0.5 * z * z);
+            let inverse = 1.0 / (z.abs() + 4.0);
+            let beyond = bell * inverse * TAIL.iter().rev().fold(0.0, |sum, c| sum * ((z.abs() - 4.0) * inverse) + c);
+            tails[lane] += of.weights[lane] * if z > 0.0 { 1.0 - beyond } else { beyond };
+            slopes[lane] += of.weights[lane] * bell / of.deviations[lane];
         }
-        [tails.iter().sum(), slopes.iter().sum::<f64>() / (2.0 * std::f64::consts::PI).sqrt()]
     }
+    [tails.iter().sum(), slopes.iter().sum::<f64>() / (2.0 * std::f64::consts::PI).sqrt()]
 }
 
 /// Φ(−z) exp(z²/2) (z + 4) as powers of (z − 4)/(z + 4), for z ≥ 0: interpolation at 24 Chebyshev points, within 5e-16.
@@ -188,8 +209,7 @@ mod tests {
             deviations: [1.0; LANES],
         };
         for z in (-3700..=3700).map(|z| f64::from(z) / 100.0) {
-            let sums = Sums { kernels: std::slice::from_ref(&standard), side: 1.0, x: z };
-            let [tail, slope] = pulp::NullaryFnOnce::call(sums);
+            let [tail, slope] = sums(std::slice::from_ref(&standard), 1.0, z);
             assert!((tail / normal_cdf(z) - 1.0).abs() < 1e-14 + z * z * 3e-16, "{z}: {tail}");
             assert!(
                 (slope / (libm::exp(-0.5 * z * z) / (2.0 * std::f64::consts::PI).sqrt()) - 1.0).abs() < 1e-13,
