@@ -84,17 +84,17 @@ fn quantile(weights: &[f64], means: &[f64], deviations: &[f64], u: f64) -> f64 {
     // What all others together add to the tail is less than its rounding.
     let negligible = 0.25 * f64::EPSILON * tail_of_u * total / weights.len() as f64;
     let mut kernels: Vec<Kernels> = Vec::with_capacity(weights.len().div_ceil(LANES));
-    let mut lane = LANES;
+    let mut kept = 0;
     let (mut low, mut high, mut narrowest) = (f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY);
     for ((&weight, &mean), &deviation) in weights.iter().zip(means).zip(deviations) {
         if weight > negligible {
-            if lane == LANES {
+            let at = kept % LANES;
+            if at == 0 {
                 kernels.push(Kernels { weights: [0.0; LANES], means: [mean; LANES], deviations: [deviation; LANES] });
-                lane = 0;
             }
-            let of = kernels.last_mut().expect("just pushed");
-            (of.weights[lane], of.means[lane], of.deviations[lane]) = (weight, mean, deviation);
-            lane += 1;
+            let of = &mut kernels[kept / LANES];
+            (of.weights[at], of.means[at], of.deviations[at]) = (weight, mean, deviation);
+            kept += 1;
             let end = mean + u * deviation;
             (low, high, narrowest) = (low.min(end), high.max(end), narrowest.min(deviation));
         }
