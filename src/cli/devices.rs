@@ -48,7 +48,7 @@ impl Devices {
 }
 
 #[cfg(feature = "gpu")]
-const NOTHING: &str = "No compute device: no driver of Vulkan, Metal, Direct3D 12 or OpenGL shows one.
+const NOTHING: &str = "No compute device: no driver of Vulkan, Metal or Direct3D 12 shows one.
 A GPU needs its vendor's driver with Vulkan (on Debian for AMD and Intel: libvulkan1 mesa-vulkan-drivers).
 Software, for tests: libvulkan1 mesa-vulkan-drivers (Debian), which brings llvmpipe.
 In a container the GPU and its graphics driver must be passed in (NVIDIA_DRIVER_CAPABILITIES=all).

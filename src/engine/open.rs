@@ -15,7 +15,7 @@ use lanesweep_support::{Error, Result, option};
 pub struct DeviceRecord {
     /// Name.
     pub name: String,
-    /// Interface: Vulkan, Metal, DX12, GL.
+    /// Interface: Vulkan, Metal, DX12.
     pub api: &'static str,
     /// Driver and its version.
     pub driver: String,

@@ -178,7 +178,7 @@ fn a_device_that_leaves_lanes_out_is_an_error_and_no_result() {
     assert!(error.to_string().contains("of 400 lanes") || error.to_string().contains("lanes of"), "{error}");
 }
 
-/// The plain path (naga's own module, as on Metal, DX12 and GL) may contract and reassociate: equality is not
+/// The plain path (naga's own module, as on Metal and DX12) may contract and reassociate: equality is not
 /// promised there, and what the drivers at hand do is printed.
 #[test]
 fn the_self_check_finds_what_the_plain_path_changes() {

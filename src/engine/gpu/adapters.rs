@@ -18,7 +18,7 @@ pub enum DeviceKind {
     Virtual,
     /// A rasterizer that runs on the CPU: llvmpipe, WARP.
     Software,
-    /// The driver does not report it; OpenGL never does for a discrete GPU.
+    /// The driver does not report it.
     Other,
 }
 
@@ -52,9 +52,6 @@ pub enum Api {
     /// Direct3D 12 (Windows).
     #[serde(rename = "DX12")]
     Dx12,
-    /// OpenGL or OpenGL ES.
-    #[serde(rename = "GL")]
-    Gl,
 }
 
 impl Api {
@@ -64,7 +61,6 @@ impl Api {
             Api::Vulkan => "Vulkan",
             Api::Metal => "Metal",
             Api::Dx12 => "DX12",
-            Api::Gl => "GL",
         }
     }
 
@@ -73,8 +69,7 @@ impl Api {
             wgpu::Backend::Vulkan => Some(Api::Vulkan),
             wgpu::Backend::Metal => Some(Api::Metal),
             wgpu::Backend::Dx12 => Some(Api::Dx12),
-            wgpu::Backend::Gl => Some(Api::Gl),
-            wgpu::Backend::Noop | wgpu::Backend::BrowserWebGpu => None,
+            wgpu::Backend::Gl | wgpu::Backend::Noop | wgpu::Backend::BrowserWebGpu => None,
         }
     }
 }
@@ -188,15 +183,17 @@ pub struct Adapters {
 impl Adapters {
     /// Lists the devices of all drivers. A machine without devices gives an empty list, never an error.
     ///
-    /// OpenGL is used only if no other interface has a device, because it lists the same devices without bus ids.
-    ///
     /// Nothing is written to stdout. Without `XDG_RUNTIME_DIR` and display, Mesa's device-select layer warns twice on
     /// stderr; the program sets `NODEVICE_SELECT=1` to silence it.
     pub fn enumerate() -> Adapters {
-        let mut found = ask(wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12);
-        if found.is_empty() {
-            found = ask(wgpu::Backends::GL);
-        }
+        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+        descriptor.backends = wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12;
+        // The same flags in every build: validation layers are slow and write messages.
+        descriptor.flags = wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL;
+        let backends = descriptor.backends;
+        let adapters = pollster::block_on(wgpu::Instance::new(descriptor).enumerate_adapters(backends));
+        let described = adapters.into_iter().filter_map(|adapter| Some((AdapterCard::of(&adapter)?, adapter)));
+        let mut found: Vec<(AdapterCard, wgpu::Adapter)> = described.collect();
         found.sort_by(|(a, _), (b, _)| order(a).cmp(&order(b)));
         let (mut cards, adapters): (Vec<AdapterCard>, Vec<wgpu::Adapter>) = found.into_iter().unzip();
         for (index, card) in cards.iter_mut().enumerate() {
@@ -218,16 +215,6 @@ impl Adapters {
         let adapter = self.adapters.get(index).cloned();
         adapter.ok_or_else(|| Error::Internal(format!("device {index} of {} was requested", self.adapters.len())))
     }
-}
-
-fn ask(backends: wgpu::Backends) -> Vec<(AdapterCard, wgpu::Adapter)> {
-    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
-    descriptor.backends = backends;
-    // The same flags in every build: validation layers are slow and write messages.
-    descriptor.flags = wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL;
-    let instance = wgpu::Instance::new(descriptor);
-    let adapters = pollster::block_on(instance.enumerate_adapters(backends));
-    adapters.into_iter().filter_map(|adapter| Some((AdapterCard::of(&adapter)?, adapter))).collect()
 }
 
 /// Sort key of the list. Model numbers last, for equal devices without a bus id.
