@@ -1,7 +1,9 @@
 //! Lanes to compare backends with: profiles in which every option takes every form, and plans.
 use super::mined::scenarios_of;
-use lanesweep::engine::verify::{SetOptions, random_plan, threshold_plan};
-use lanesweep::engine::{Constants, LaneCase, LanePlan, Outcome, Start, Step};
+use lanesweep::engine::verify::{Comparison, SetOptions, compare, random_plan, threshold_plan};
+use lanesweep::engine::{
+    Backend, Chunk, Constants, CpuBackend, LaneCase, LanePlan, Outcome, Start, Step, Verdicts, Wanted, same_words,
+};
 use lanesweep::model::criterion::{BtnContact, BtnForm, LateralGate};
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::{CutOutEvaluated, CutOutTarget, Profile};
@@ -79,6 +81,39 @@ pub fn run_lane<R: Real>(
     observer: &mut dyn FnMut(&Step<R>),
 ) -> Outcome<R> {
     constants.run(model, case, tables, start, observer)
+}
+
+/// All lanes of a plan at once.
+pub fn swept(plan: &LanePlan, backend: &dyn Backend, wanted: Wanted) -> Chunk {
+    backend.prepare(plan).unwrap().run(0..plan.unit_count(), wanted).unwrap()
+}
+
+pub fn swept_on_cpu(plan: &LanePlan, wanted: Wanted) -> Chunk {
+    swept(plan, &CpuBackend::lane_arithmetic(), wanted)
+}
+
+/// So many units at a time: outcomes and, asked for separately, verdicts are the words of the lanes of `expected`.
+pub fn assert_same_in_calls(plan: &LanePlan, backend: &dyn Backend, units: u64, expected: &[Outcome<f64>], what: &str) {
+    let mut session = backend.prepare(plan).unwrap();
+    let (mut from, mut outcomes, mut verdicts) = (0, Vec::new(), Vec::new());
+    while from < plan.unit_count() {
+        let to = (from + units).min(plan.unit_count());
+        outcomes.extend(session.run(from..to, Wanted::Outcomes).unwrap().outcomes);
+        verdicts.extend(session.run(from..to, Wanted::Verdicts).unwrap().verdicts);
+        from = to;
+    }
+    assert!(outcomes.len() == expected.len() && verdicts.len() == expected.len(), "{what}");
+    assert!(outcomes.iter().zip(expected).all(|(a, b)| same_words(a, b)), "{what}");
+    assert!(verdicts.iter().zip(expected).all(|(a, b): (&Verdicts, _)| *a == b.verdicts), "{what}");
+}
+
+/// Outcomes, verdicts and counts of a backend are those of the scalar lanes.
+pub fn assert_equal(what: &str, plan: &LanePlan, backend: &dyn Backend) {
+    let found = compare(what, plan, backend, |_| ()).unwrap_or_else(|error| panic!("{what}: {error}"));
+    let Comparison { worst, modes_differing, .. } = &found;
+    let worst: Vec<String> = worst.iter().map(|l| format!("{} {:?}", l.key, l.names())).collect();
+    assert!(found.is_equal(), "{what}, {}: {worst:#?}, modes {modes_differing}", backend.describe());
+    assert_eq!(found.lanes(), plan.lane_count(), "{what}");
 }
 
 pub fn random(profile: &Profile, lanes: u64) -> LanePlan {

@@ -10,20 +10,18 @@ pub mod device;
 pub mod dice;
 pub mod exid;
 pub mod lane_sets;
+#[cfg(feature = "parquet")]
+pub mod made;
 pub mod mined;
-pub mod page;
 pub mod plans;
 pub mod program;
 pub mod reliability;
 pub mod small;
-#[cfg(feature = "parquet")]
-pub mod tables;
 
 /// A path below the shared folder (`../shared`, or the environment variable `LANESWEEP_SHARED`); where
 /// it is absent, says so loudly and gives `None`: the test returns.
 pub fn shared(rel: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("LANESWEEP_SHARED")
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
+    let root = std::env::var_os("LANESWEEP_SHARED").map_or_else(|| in_crate("../shared"), PathBuf::from);
     let path = root.join(rel);
     if path.exists() {
         return Some(path);
@@ -37,8 +35,31 @@ pub fn skipped(why: &str) {
     let _ = writeln!(std::io::stderr(), "SKIPPED: {why}");
 }
 
+pub fn in_crate(path: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(path)
+}
+
+pub fn text_of(path: &str) -> String {
+    std::fs::read_to_string(in_crate(path)).unwrap_or_else(|error| panic!("{path}: {error}"))
+}
+
 pub fn golden(name: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(name)
+    in_crate("tests/golden").join(name)
+}
+
+/// A golden file of JSON; the infinities that Python writes, which JSON does not know, are null.
+pub fn golden_json(name: &str) -> serde_json::Value {
+    serde_json::from_str(&text_of(&format!("tests/golden/{name}")).replace("-Infinity", "null")).unwrap()
+}
+
+/// Numbers, or rows of them.
+pub fn numbers<T: serde::de::DeserializeOwned>(value: &serde_json::Value) -> Vec<T> {
+    serde_json::from_value(value.clone()).unwrap()
+}
+
+/// What `work` gives with so many threads.
+pub fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(work)
 }
 
 /// The four SUMO recordings of the shared folder, unpacked once below the target folder; says loudly why

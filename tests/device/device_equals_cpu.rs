@@ -1,26 +1,17 @@
 //! Every output word of a device (here the software Vulkan) equals the CPU's, bit for bit; and a wrong shader is found.
 
 use crate::common::device::{open, patched, tampered};
-use crate::common::lane_sets::{forms, of_model, random, small_study, small_study_of, thresholds};
+use crate::common::lane_sets::{
+    assert_equal, assert_same_in_calls, forms, of_model, random, small_study, small_study_of, swept_on_cpu, thresholds,
+};
 use lanesweep::engine::gpu::{GpuOptions, Tampering};
 use lanesweep::engine::verify::{Comparison, compare, self_check};
-use lanesweep::engine::{Backend, Chunk, CpuBackend, Headway, LanePlan, Wanted, same_words};
+use lanesweep::engine::{Backend, Headway, LanePlan, Wanted};
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::grid::{CaseStyle, Grid, GridAxis, GridParts, GridPlan, MapParameter};
 use lanesweep::run::study::StudyOptions;
 use lanesweep::scenario::Category;
-
-fn run(backend: &dyn Backend, plan: &LanePlan, wanted: Wanted) -> Chunk {
-    let chunk = backend.prepare(plan).unwrap().run(0..plan.unit_count(), wanted).unwrap();
-    chunk.check(plan).unwrap();
-    chunk
-}
-
-fn assert_equal(what: &str, comparison: &Comparison) {
-    let worst: Vec<String> = comparison.worst.iter().map(|l| format!("{} {:?}", l.key, l.names())).collect();
-    assert!(comparison.is_equal(), "{what}: {worst:#?}, modes {}", comparison.modes_differing);
-}
 
 /// The regulation's distance between vehicles, at speeds of every part of its table.
 fn at_the_minimum_following_distance() -> LanePlan {
@@ -50,9 +41,7 @@ fn every_word_of_small_studies_and_of_every_kind_of_start_equals_the_cpus() {
     for (what, plan) in
         [("study", small_study()), ("observed", observed), ("following", at_the_minimum_following_distance())]
     {
-        let comparison = compare(what, &plan, &gpu, |_| ()).unwrap();
-        assert_equal(what, &comparison);
-        assert_eq!(comparison.lanes(), plan.lane_count());
+        assert_equal(what, &plan, &gpu);
     }
 }
 
@@ -63,30 +52,18 @@ fn lanes_are_equal_under_every_profile_and_form_of_every_option_and_at_other_tim
     let shipped = Profile::names().map(|name| (Profile::load(name).unwrap(), 1000, 3));
     for (profile, lanes, units) in shipped.chain(forms().into_iter().map(|form| (form, 200, 1))) {
         let what = format!("{} {:?} {:?}", profile.name, profile.criteria, profile.frame);
-        for plan in [random(&profile, lanes), thresholds(&profile, units)] {
-            let comparison = compare("form", &plan, &gpu, |_| ());
-            assert_equal(&what, &comparison.unwrap_or_else(|error| panic!("{what}: {error}")));
-        }
+        [random(&profile, lanes), thresholds(&profile, units)].iter().for_each(|plan| assert_equal(&what, plan, &gpu));
     }
 }
 
 #[test]
 fn the_cut_into_jobs_and_into_calls_changes_no_word() {
     let plan = random(&Profile::load("paper").unwrap(), 600);
-    let cpu = run(&CpuBackend::lane_arithmetic(), &plan, Wanted::Outcomes);
+    let expected = swept_on_cpu(&plan, Wanted::Outcomes).outcomes;
     for first_lanes in [1, 77, 1 << 22] {
         let Some(gpu) = open(GpuOptions { first_lanes, ..Default::default() }) else { return };
-        let mut session = gpu.prepare(&plan).unwrap();
         // Sizes that fit no word: 7 units are 280 lanes of each model.
-        let (mut from, mut outcomes, mut verdicts) = (0, Vec::new(), Vec::new());
-        while from < plan.unit_count() {
-            let to = (from + 7).min(plan.unit_count());
-            outcomes.extend(session.run(from..to, Wanted::Outcomes).unwrap().outcomes);
-            verdicts.extend(session.run(from..to, Wanted::Verdicts).unwrap().verdicts);
-            from = to;
-        }
-        assert!(outcomes.iter().zip(&cpu.outcomes).all(|(a, b)| same_words(a, b)), "first job of {first_lanes} lanes");
-        assert!(outcomes.len() == cpu.outcomes.len() && verdicts == cpu.verdicts);
+        assert_same_in_calls(&plan, &gpu, 7, &expected, &format!("first job of {first_lanes} lanes"));
     }
 }
 
@@ -99,7 +76,7 @@ fn an_invocation_that_computes_many_lanes_writes_the_same_words() {
         let options = GpuOptions { lanes_per_invocation, split_scenes: Some(true), ..Default::default() };
         let Some(gpu) = open(options) else { return };
         let plan = random(&profile, size);
-        assert_equal(&format!("{lanes} lanes"), &compare("random", &plan, &gpu, |_| ()).unwrap());
+        assert_equal(&format!("{lanes} lanes"), &plan, &gpu);
     }
 }
 

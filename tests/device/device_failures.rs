@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use crate::common::device::{lost_at, open, out_of_memory_at, patched, tampered};
+use crate::common::lane_sets::{self, swept_on_cpu};
 use lanesweep::Error;
 use lanesweep::engine::gpu::{GpuBackend, GpuOptions};
 use lanesweep::engine::verify::{SetOptions, random_plan};
@@ -36,7 +37,7 @@ fn swept(plan: &LanePlan, gpu: &GpuBackend) -> (Vec<Verdicts>, SweepSummary) {
 }
 
 fn expected(plan: &LanePlan) -> Vec<Verdicts> {
-    CpuBackend::lane_arithmetic().prepare(plan).unwrap().run(0..plan.unit_count(), Wanted::Verdicts).unwrap().verdicts
+    swept_on_cpu(plan, Wanted::Verdicts).verdicts
 }
 
 #[test]
@@ -97,8 +98,7 @@ fn lanes_of_more_steps_than_a_device_runs_are_computed_all_the_same() {
     let profile = Profile::load("jrc-2021").unwrap();
     let mut long = profile.with_dt(0.001).unwrap();
     long.frame.time_cap_s = 120.0;
-    let options = SetOptions { size: 40, ..Default::default() };
-    let plan = random_plan(&long, &options).unwrap();
+    let plan = lane_sets::random(&long, 40);
     let Some(gpu) = open(GpuOptions::default()) else { return };
     let (verdicts, summary) = swept(&plan, &gpu);
     assert!(verdicts == expected(&plan));

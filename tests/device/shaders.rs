@@ -2,8 +2,9 @@
 
 use std::collections::BTreeSet;
 use std::mem::offset_of;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use crate::common::{in_crate, text_of};
 use crate::device::wgsl::{
     Shape, constant, fields, float_operations, function_names, parse, unbounded_loops, uninitialized_in_loops,
     without_comments,
@@ -444,14 +445,9 @@ fn a_variable_in_a_loop_that_begins_with_nothing_is_found() {
     assert!(uninitialized_in_loops(&body("var x: u32 = 0u;")).is_empty());
 }
 
-fn in_crate(path: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
-}
-
 /// Functions of the Rust file beside a shader, but for those without a twin.
 fn twin_functions(folder: &str, shader: &str, no_twin: &[&str]) -> Vec<String> {
-    let twin = in_crate(folder).join(shader).with_extension("rs");
-    let text = std::fs::read_to_string(&twin).unwrap_or_else(|e| panic!("{}: {e}", twin.display()));
+    let text = text_of(&format!("{folder}/{}", shader.replace(".wgsl", ".rs")));
     let mut names = function_names(text.split("#[cfg(test)]").next().unwrap());
     names.retain(|name| !no_twin.contains(&name.as_str()));
     names

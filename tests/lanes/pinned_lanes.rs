@@ -2,7 +2,7 @@
 
 use sha2::{Digest, Sha256};
 
-use crate::common::lane_sets::run_lane;
+use crate::common::lane_sets::{run_lane, swept};
 
 use lanesweep::engine::ENGINE_VERSION;
 use lanesweep::engine::verify::{SetOptions, random_plan, threshold_plan};
@@ -93,8 +93,7 @@ fn lanes(digests: &mut [Sha256; 2], plan: &LanePlan) -> usize {
     let (narrow, wide) = (CpuBackend::scalar(), CpuBackend::reference());
     let backends: [&dyn Backend; 2] = [&narrow, &wide];
     for backend in backends {
-        let chunk = backend.prepare(plan).unwrap().run(0..plan.unit_count(), Wanted::Outcomes).unwrap();
-        chunk.outcomes.iter().for_each(|outcome| add(digests, outcome));
+        swept(plan, backend, Wanted::Outcomes).outcomes.iter().for_each(|outcome| add(digests, outcome));
     }
     plan.lane_count() as usize
 }

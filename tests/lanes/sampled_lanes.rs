@@ -1,6 +1,7 @@
 //! Cases made where lanes run: they mean what the host's cases mean, and every backend makes the same bits of them.
 
 use crate::common;
+use crate::common::lane_sets::swept_on_cpu;
 use crate::common::mined::{density_of, provenance, scenarios_of};
 
 use lanesweep::engine::{Backend, CpuBackend, Headway, Instructions, LaneCase, LanePlan, Wanted, words};
@@ -128,8 +129,7 @@ fn samples_are_the_same_whatever_the_chunks_threads_and_instructions() {
             let backend = CpuBackend::with_instructions(instructions).unwrap();
             assert!(whole == outcomes(&plan, &backend, &[0, n / 2, n]), "{id:?} {instructions}");
         }
-        let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-        let alone = one.install(|| outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]));
+        let alone = common::with_threads(1, || outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]));
         assert!(whole == alone, "{id:?}: threads matter");
     }
 }
@@ -210,10 +210,9 @@ fn indices_beyond_32_bits_are_samples_of_their_own() {
 /// Failures of samples, and of the scenarios that they come from, at finer and coarser steps: none vanish.
 #[test]
 fn failures_of_samples_and_studies_vary_smoothly_with_the_time_step() {
-    let backend = CpuBackend::lane_arithmetic();
     let failures = |plan: &LanePlan| -> Vec<f64> {
         let mut counts = vec![[0_u64; 3]; plan.models.len()];
-        let chunk = backend.prepare(plan).unwrap().run(0..plan.unit_count(), Wanted::Verdicts).unwrap();
+        let chunk = swept_on_cpu(plan, Wanted::Verdicts);
         for (lane, verdict) in chunk.verdicts.iter().enumerate() {
             let of_model = &mut counts[lane % plan.models.len()];
             for criterion in Criterion::ALL {

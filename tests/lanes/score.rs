@@ -1,9 +1,7 @@
 //! What the score says about chosen verdicts, and that threads and chunks do not change a bit of it.
 
-use crate::common;
-use crate::common::plans;
-
-use crate::common::plans::{chunk, mixed, plan};
+use crate::common::plans::{self, chunk, mixed, plan};
+use crate::common::{golden_json, with_threads};
 use lanesweep::engine::{Confusion, LaneKey, LanePlan, Partial, Verdicts};
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
@@ -132,11 +130,8 @@ fn threads_and_chunks_do_not_change_a_bit() {
     let parts = part(&plan, 21..35, &lane).merge(part(&plan, 0..3, &lane)).unwrap();
     let parts = parts.merge(part(&plan, 3..21, &lane)).unwrap();
     assert_eq!(whole, parts);
-    let with_threads = |threads: usize, partial: &Partial| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| score(&plan, partial, &ScoreOptions::default()).unwrap())
-    };
-    let (one, two) = (with_threads(1, &whole), with_threads(2, &parts));
+    let scored = |partial: &Partial| score(&plan, partial, &ScoreOptions::default()).unwrap();
+    let (one, two) = (with_threads(1, || scored(&whole)), with_threads(2, || scored(&parts)));
     assert_eq!(one, two);
     assert_eq!(check_claims(&one, &plan, &whole), check_claims(&two, &plan, &parts));
 }
@@ -154,9 +149,7 @@ fn an_incomplete_or_foreign_sweep_is_not_scored() {
 
 #[test]
 fn the_papers_lvd_f1_follow_from_their_integer_counts() {
-    let golden = std::fs::read_to_string(common::golden("paper_lvd_f1.json")).unwrap();
-    let golden: serde_json::Value = serde_json::from_str(&golden).unwrap();
-    let mut checked = 0;
+    let (golden, mut checked) = (golden_json("paper_lvd_f1.json"), 0);
     for cell in golden["lvd"].as_object().unwrap().values().flat_map(|v| v.as_object().unwrap()) {
         let (name, cell) = cell;
         let expected = cell["F1"].as_f64().unwrap();

@@ -1,5 +1,5 @@
 //! What writing a table, or reading and planning a small file of scenarios, holds in memory.
-use crate::common::tables::made;
+use crate::common::made;
 use crate::memory;
 
 use std::fs::File;

@@ -6,6 +6,7 @@ use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 use crate::common::program::{lanesweep, ran, words};
+use crate::common::text_of;
 
 const CASE: &str = "check --category cut-in --ego-speed 60km/h --speed 40km/h --gap 15 --lateral-speed 1";
 
@@ -122,8 +123,8 @@ fn a_sheet_names_program_and_profile_and_a_comment_is_no_other_profile() {
 fn the_chapter_for_assessors_lists_what_a_sheet_does_not_consider() {
     let dir = tempfile::tempdir().unwrap();
     let document = sheet(dir.path(), CASE).0;
-    let chapter = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/src/for-assessors.md")).unwrap();
-    let chapter = chapter.replace("**", "").split_whitespace().collect::<Vec<_>>().join(" ");
+    let chapter =
+        text_of("docs/src/for-assessors.md").replace("**", "").split_whitespace().collect::<Vec<_>>().join(" ");
     let not_considered = document["not_considered"].as_array().unwrap();
     assert!(not_considered.len() > 5);
     for text in not_considered {

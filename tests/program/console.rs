@@ -81,7 +81,7 @@ fn line_fits(expected: &str, found: &str) -> bool {
 /// Answers and messages stand in `tests/messages/*.md`, the files that provoke them in the folders beside.
 #[test]
 fn every_answer_and_every_mistake_is_told_as_it_stands_in_the_messages() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/messages");
+    let folder = crate::common::in_crate("tests/messages");
     let files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     let texts: Vec<_> = files.iter().filter(|path| path.extension().is_some_and(|ending| ending == "md")).collect();
     assert_eq!(texts.len(), 9);

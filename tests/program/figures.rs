@@ -2,8 +2,8 @@
 //! `LANESWEEP_RENEW_FIGURES=1 cargo test --release --test commands figures::` writes the tables again.
 
 use std::fs;
-use std::path::Path;
 
+use crate::common::in_crate;
 use crate::common::program::ran;
 
 /// The figures of cut-ins whose tables are kept.
@@ -13,7 +13,7 @@ const KEPT: [&str; 2] = ["f1", "radar"];
 fn the_tables_of_the_figures_are_those_that_were_looked_at() {
     let dir = tempfile::tempdir().unwrap();
     ran(dir.path(), "-q study --synth-recordings 12 --categories cut-in --thw 0.4,1.2 --backend cpu --out .");
-    let kept = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/figures");
+    let kept = in_crate("tests/figures");
     for figure in KEPT {
         let name = format!("{figure}-cut-in.csv");
         let now = fs::read_to_string(dir.path().join("tables").join(&name)).unwrap();

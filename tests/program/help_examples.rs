@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use crate::common::program::PROGRAM;
-use crate::common::skipped;
+use crate::common::{in_crate, skipped};
 use crate::program::command_line::verbs_of;
 
 fn run(dir: &Path, line: &str) -> Output {
@@ -92,8 +92,7 @@ fn every_example_of_the_help_runs() {
             let case = "category,ego_speed_mps,speed_mps,gap,lateral_speed\n";
             std::fs::write(dir.join("cases.csv"), format!("{case}cut-in,30,20,20,1\ncut-in,30,20,40,1\n")).unwrap();
             std::fs::write(dir.join("own.csv"), tracks()).unwrap();
-            let generic = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/presets/generic.toml");
-            std::fs::copy(generic, dir.join("own.toml")).unwrap();
+            std::fs::copy(in_crate("configs/presets/generic.toml"), dir.join("own.toml")).unwrap();
             std::fs::write(dir.join("study.toml"), "[score]\nmin_failures = 5\n").unwrap();
             let output = run(dir, &smaller(&example));
             // Without a GPU `verify` says so.

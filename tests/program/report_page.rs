@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::common::mined::write_cut_in_density;
 use crate::common::program::ran;
+use crate::runs::parts::whole;
 
 fn quietly(dir: &Path, line: &str) {
     ran(dir, &format!("-q {line}"));
@@ -71,10 +73,8 @@ fn study(dir: &Path, name: &str, lines: &[String]) -> (PathBuf, String) {
 
 #[test]
 fn a_study_says_everything_on_its_page_and_every_figure_has_its_files() {
-    let dir = tempfile::tempdir().unwrap();
-    quietly(dir.path(), "study --synth-recordings 2 --published --backend cpu --out s");
-    let out = dir.path().join("s");
-    let html = page(&out);
+    let (out, _) = whole();
+    let html = page(out);
     let plan = "<dt>SHA-256 of the plan</dt>";
     for said in ["SYNTHETIC DATA", "Failed simulations of S", "published", plan, "seed", "Claims"] {
         assert!(html.contains(said), "{said}");
@@ -120,8 +120,8 @@ fn little_data_makes_a_readable_page_too() {
 fn sampling_runs_maps_and_comparisons_have_their_page() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    quietly(dir, "fit --synth-recordings 3 --categories cut-in --parameterizations 2 --out d");
-    let sample = "sample d/cut-in-2.json --backend cpu --samples 3000";
+    write_cut_in_density(&dir.join("d.json"));
+    let sample = "sample d.json --backend cpu --samples 3000";
     quietly(dir, &format!("{sample} --thw 1,0.6,0.2 --out mc"));
     let html = page(&dir.join("mc"));
     for said in ["<dt>SHA-256 of the density</dt>", "usable"] {

@@ -2,7 +2,7 @@
 //! undisturbed one. What the machine does not allow (mounts, another user) is skipped loudly.
 #![cfg(unix)]
 
-use crate::common::{self, page, program};
+use crate::common::{self, program};
 mod machine;
 mod workers;
 
@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 /// Nothing hidden or half-written may be left in the folder of a finished run.
 fn same(found: &Path, undisturbed: &Path) {
     let page = |(name, content): (String, Vec<u8>)| match std::str::from_utf8(&content) {
-        Ok(text) if name == "report.html" => (name, page::without_host(text).into_bytes()),
+        Ok(text) if name == "report.html" => (name, program::page_without_host(text).into_bytes()),
         _ => (name, content),
     };
     let [found, expected] = [found, undisturbed].map(|dir| without_times(files(dir)).into_iter().map(page).collect());
@@ -33,7 +33,7 @@ fn shared() -> &'static Path {
         let _ = std::fs::remove_dir_all(&dir);
         std::fs::create_dir_all(&dir).unwrap();
         std::fs::copy(common::golden("paper_sumo_01_02_scenarios.jsonl"), dir.join("scenarios.jsonl")).unwrap();
-        ran(&dir, "-q fit --synth-recordings 3 --categories cut-in --parameterizations 2 --out density.json");
+        common::mined::write_cut_in_density(&dir.join("density.json"));
         let _ = RUNS.map(|(name, run)| ran(&dir, &format!("{run} --out {name}")));
         dir
     })

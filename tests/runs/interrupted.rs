@@ -5,9 +5,9 @@ use std::path::Path;
 use std::process::Child;
 use std::time::{Duration, Instant};
 
+use crate::common::lane_sets::random;
 use crate::common::program::{self, names, send, start, wait_for_run, wait_until, words};
 use lanesweep::Error;
-use lanesweep::engine::verify::{SetOptions, random_plan};
 use lanesweep::engine::{CpuBackend, Executor, Wanted};
 use lanesweep::model::profile::Profile;
 use lanesweep::support::cancel::Cancel;
@@ -44,7 +44,7 @@ fn study_interrupted_by(signal: &str) -> i32 {
 
 /// Ten scenarios of 100 s, as a file.
 fn long_scenarios(path: &Path) {
-    let golden = std::fs::read_to_string(crate::common::golden("paper_sumo_01_02_scenarios.jsonl")).unwrap();
+    let golden = crate::common::text_of("tests/golden/paper_sumo_01_02_scenarios.jsonl");
     let mut scenario: serde_json::Value = golden.lines().next().unwrap().parse().unwrap();
     let samples = 2500;
     let speeds: Vec<f64> = (0..samples).map(|k| 25.0 + f64::from(k % 100) / 100.0).collect();
@@ -134,8 +134,7 @@ fn a_time_limit_and_a_request_are_seen_until_they_are_withdrawn() {
 
 #[test]
 fn a_sweep_whose_owner_cancels_it_ends_after_the_chunk_and_keeps_nothing() {
-    let options = SetOptions { size: 200, ..Default::default() };
-    let plan = random_plan(&Profile::load("paper").unwrap(), &options).unwrap();
+    let plan = random(&Profile::load("paper").unwrap(), 200);
     let executor = Executor { chunk_lanes: Some(100), ..Executor::new(CpuBackend::lane_arithmetic()) };
     let (cancel, mut chunks) = (executor.cancel.clone(), 0);
     let swept = executor.sweep(&plan, 0..plan.unit_count(), Wanted::Verdicts, |_| {

@@ -2,11 +2,13 @@
 //! undisturbed. Long: `LANESWEEP_KILLS=300 cargo test --release --test commands kills:: -- --nocapture`
 #![cfg(unix)]
 
+use crate::common::mined::write_cut_in_density;
 use crate::common::program::{self, Files, ended, kill, names, same, unbroken, without_times, words};
 
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Child;
+use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 const LIST: &str = "lanesweep-files.json";
@@ -86,13 +88,21 @@ fn put(dir: &Path, from: Option<&str>) {
     }
 }
 
-fn furnish(dir: &Path) {
-    done(dir, "fit --synth-recordings 2 --categories cut-in --parameterizations 2 --out d.json");
-    let plan = "study --synth-recordings 1 --config study.reference=true --dt 0.02 --plan-only";
-    done(dir, &format!("{plan} --out plan"));
-    done(dir, &format!("{plan} --out parts"));
-    done(dir, "study --plan plan/plan.json --shard 0/2 --out parts");
-    done(dir, "study --plan plan/plan.json --shard 1/2 --out parts");
+/// A folder with a density, a plan and the parts of its run, which are made once.
+fn furnished() -> tempfile::TempDir {
+    static MADE: LazyLock<Files> = LazyLock::new(|| {
+        let dir = tempfile::tempdir().unwrap();
+        let dir = dir.path();
+        write_cut_in_density(&dir.join("d.json"));
+        done(dir, "study --synth-recordings 1 --config study.reference=true --dt 0.02 --plan-only --out plan");
+        program::copy(&dir.join("plan"), &dir.join("parts"));
+        let _ =
+            ["0/2", "1/2"].map(|shard| done(dir, &format!("study --plan plan/plan.json --shard {shard} --out parts")));
+        program::files(dir)
+    });
+    let dir = tempfile::tempdir().unwrap();
+    program::put(&MADE, dir.path());
+    dir
 }
 
 /// Where `out` starts from: parts for a merge, the older result.
@@ -117,9 +127,8 @@ fn assert_tidy(dir: &Path, what: &str) {
 #[test]
 fn a_killed_run_leaves_one_runs_files_and_ends_as_if_undisturbed() {
     let kills: usize = std::env::var("LANESWEEP_KILLS").map_or(VERBS.len(), |text| text.parse().unwrap());
-    let dir = tempfile::tempdir().unwrap();
+    let dir = furnished();
     let dir = dir.path();
-    furnish(dir);
     let mut undisturbed: BTreeMap<(usize, bool), (Duration, Files)> = BTreeMap::new();
     let (mut alive, mut continued, mut switching, mut recorded) = (0, 0, 0, 0);
     for at_kill in 0..kills {
@@ -212,9 +221,8 @@ fn scenarios_and_what_was_driven_for_them_are_of_one_run_after_a_kill() {
 #[test]
 fn of_two_processes_on_one_folder_each_ends_as_if_alone_or_is_refused() {
     let every = if std::env::var_os("LANESWEEP_KILLS").is_some() { 1 } else { 3 };
-    let dir = tempfile::tempdir().unwrap();
+    let dir = furnished();
     let dir = dir.path();
-    furnish(dir);
     let alone = VERBS.map(|verb| {
         put(dir, Some("parts"));
         done(dir, verb.run);

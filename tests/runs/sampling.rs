@@ -1,6 +1,6 @@
 //! Sampling runs: the same counts and the same failing lanes however a run is cut up.
 
-use crate::common::mined::density_of;
+use crate::common::mined::{density_of, write_cut_in_density};
 use crate::common::program::{json, ran, refused, table};
 use crate::common::{self, program};
 
@@ -22,7 +22,7 @@ fn density(category: Category, key: &str) -> DensityModel {
 
 fn folder() -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
-    write_density(&dir.path().join("density.json"), &density(Category::CutIn, "2")).unwrap();
+    write_cut_in_density(&dir.path().join("density.json"));
     dir
 }
 
@@ -235,9 +235,8 @@ fn of_few(density: &DensityModel, scenarios: usize) -> DensityModel {
 /// A folder with the density over nine scenarios and that over all.
 fn few_and_all() -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
-    let all = density(Category::CutIn, "2");
-    write_density(&dir.path().join("nine.json"), &of_few(&all, 9)).unwrap();
-    write_density(&dir.path().join("all.json"), &all).unwrap();
+    write_density(&dir.path().join("nine.json"), &of_few(&density(Category::CutIn, "2"), 9)).unwrap();
+    write_cut_in_density(&dir.path().join("all.json"));
     dir
 }
 
@@ -309,8 +308,7 @@ fn counts_join_in_any_order_and_never_twice_and_threads_do_not_change_them() {
     let whole = of(&plan, 0..900);
     assert!(whole.failures.iter().sum::<u64>() > 0);
     assert!(of(&plan, 700..900).merge(of(&plan, 0..1)).unwrap().merge(of(&plan, 1..700)).unwrap() == whole);
-    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    assert!(one.install(|| of(&plan, 0..900)) == whole, "one thread");
+    assert!(common::with_threads(1, || of(&plan, 0..900)) == whole, "one thread");
     assert!(of(&plan, 0..100).merge(of(&other, 100..200)).is_err(), "two runs");
     let error = of(&plan, 0..100).merge(of(&plan, 99..200)).unwrap_err().to_string();
     assert!(error.contains("samples 99 to 99 are in both"), "{error}");

@@ -2,9 +2,10 @@
 #![cfg(feature = "parquet")]
 
 use crate::common::dice::{Dice, cases};
+use crate::common::made;
 use crate::common::mined::density_of;
 use crate::common::program::{json, ran};
-use crate::common::tables::made;
+use crate::common::text_of as in_crate_text;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -206,8 +207,7 @@ fn check_facts(table: &Read, kind: &str, has_lanes: bool) {
     assert_eq!(table.key_values.contains_key("lanesweep.plan_sha256"), has_lanes);
     let words: Vec<serde_json::Value> = serde_json::from_str(&table.key_values["lanesweep.columns"]).unwrap();
     assert_eq!(words.iter().map(|w| w["name"].as_str().unwrap()).collect::<Vec<_>>(), table.columns);
-    let chapter = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/src/tables.md");
-    let chapter = std::fs::read_to_string(chapter).unwrap();
+    let chapter = in_crate_text("docs/src/tables.md");
     let cells = |line: &str| line.split('|').map(|cell| cell.trim().replace('`', "")).collect::<Vec<_>>();
     let rows_of = |kind: &str| -> Vec<Vec<String>> {
         let section = chapter.split("\n## ").find(|part| part.starts_with(&format!("`{kind}`"))).expect(kind);
@@ -241,8 +241,7 @@ fn check_facts(table: &Read, kind: &str, has_lanes: bool) {
 
 #[test]
 fn the_chapter_has_the_ranges_that_readers_apply() {
-    let chapter = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/src/tables.md");
-    let chapter = std::fs::read_to_string(chapter).unwrap();
+    let chapter = in_crate_text("docs/src/tables.md");
     let section = chapter.split("\n## ").find(|part| part.starts_with("Plausible values")).unwrap();
     let rows: Vec<&str> = section.lines().filter(|line| line.starts_with("| ")).skip(1).collect();
     assert_eq!(rows.len(), LIMITS.len());

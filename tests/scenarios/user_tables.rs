@@ -1,8 +1,8 @@
 //! Tables of scenarios and cases that users make: what is read of them (what is refused: `tests/messages/tables.md`).
 #![cfg(feature = "parquet")]
 
+use crate::common::made;
 use crate::common::program::{ran, said};
-use crate::common::tables::made;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -9,6 +9,7 @@ use lanesweep::stats::estimate::{
 use crate::common::reliability::{
     StandardNormal, adaptive, four_branch, four_branch_probability, importance, linear, tail, two_sided, unit_mixture,
 };
+use crate::common::{golden_json, numbers, with_threads};
 
 /// At most so many draws of the density, in the search and again beside the final draws.
 const CRUDE: u64 = 1_000_000;
@@ -25,12 +26,8 @@ fn close(got: f64, expected: f64) -> bool {
 
 #[test]
 fn the_author_s_estimates_are_reproduced() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/importance_sampling.json");
-    let text = std::fs::read_to_string(path).expect("the golden file");
-    let golden: serde_json::Value = serde_json::from_str(&text).expect("JSON");
-    let column = |table: &str, k: usize| -> Vec<f64> {
-        golden[table][k].as_array().expect("a column").iter().map(|v| v.as_f64().expect("a number")).collect()
-    };
+    let golden = golden_json("importance_sampling.json");
+    let column = |table: &str, k: usize| -> Vec<f64> { numbers(&golden[table][k]) };
     let number = |path: &str| golden.pointer(path).and_then(|v| v.as_f64()).expect("a number");
     let of = |table: &str, ratio: &dyn Fn(usize) -> f64, response: &dyn Fn(usize) -> f64| -> WeightSums {
         let tries = column(table, 1);
@@ -79,8 +76,7 @@ fn sums_of_a_proposal_are_the_same_bits_in_any_division_of_the_indices() {
     parts.merge(of(0..123)).unwrap();
     parts.merge(of(123..7001)).unwrap();
     assert_eq!(parts, whole);
-    let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    assert_eq!(one_thread.install(|| of(0..20_000)), whole);
+    assert_eq!(with_threads(1, || of(0..20_000)), whole);
 }
 
 #[test]
@@ -165,8 +161,7 @@ fn one_search_answers_several_questions_with_the_same_draws() {
 #[test]
 fn a_search_has_the_same_bits_with_one_thread() {
     let of = || found(&StandardNormal { dimensions: 4 }, &linear(4.0), 8);
-    let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    assert_eq!(one_thread.install(of), of());
+    assert_eq!(with_threads(1, of), of());
 }
 
 #[test]

@@ -211,11 +211,11 @@ fn parquet_with_gzip_or_lz4_and_microseconds_is_the_table_and_instants_are_refus
     let gzip = Compression::GZIP(GzipLevel::default());
     for codec in [gzip, Compression::LZ4, Compression::LZ4_RAW, Compression::SNAPPY] {
         let columns = table.header.iter().map(|name| (name.as_str(), column(name, false))).collect();
-        crate::common::tables::made::write(&path, columns, codec);
+        crate::common::made::write(&path, columns, codec);
         assert!(from_frame_0(read("own.parquet", &fs::read(&path).unwrap()).unwrap()) == right, "{codec:?}");
     }
     let columns = table.header.iter().map(|name| (name.as_str(), column(name, true))).collect();
-    crate::common::tables::made::write(&path, columns, gzip);
+    crate::common::made::write(&path, columns, gzip);
     let error = read("own.parquet", &fs::read(&path).unwrap()).unwrap_err();
     assert!(error.help().unwrap().contains("a time to int64"), "{error:?}");
 }

@@ -1,6 +1,7 @@
 //! The synthetic recordings are physically possible, well-formed, and the same everywhere.
 
 use crate::common::mined::recordings;
+use crate::common::with_threads;
 use lanesweep::support::plain_text::hex;
 use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate, generate_one};
 use lanesweep::traffic::trajectory::{Recording, Track};
@@ -37,9 +38,8 @@ fn digest(recordings: &[Recording]) -> String {
 
 #[test]
 fn the_default_recordings_are_the_same_bits_on_every_machine_and_thread_count() {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     let options = GeneratorOptions { recordings: 2, ..GeneratorOptions::default() };
-    let one = pool.install(|| generate(&options).unwrap());
+    let one = with_threads(1, || generate(&options).unwrap());
     assert_eq!(digest(&one), digest(recordings(2)), "one thread and all threads differ");
     assert_eq!(digest(recordings(12)), DEFAULT_DIGEST, "the default recordings have changed");
 }

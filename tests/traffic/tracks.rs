@@ -488,7 +488,7 @@ fn write_parquet(path: &Path, text: &str, vehicle: &str) {
         }
     };
     let columns = names.iter().enumerate().map(|(at, name)| (*name, column(at, name))).collect();
-    crate::common::tables::made::write(path, columns, parquet::basic::Compression::SNAPPY);
+    crate::common::made::write(path, columns, parquet::basic::Compression::SNAPPY);
 }
 
 /// Every preset reads traffic in its own format, and finds the usual mistakes in it.

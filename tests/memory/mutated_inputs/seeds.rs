@@ -20,6 +20,7 @@ use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 use super::readers::{PART_UNITS, small_plan};
 use super::small;
 use crate::common::mined::{fitted, provenance};
+use crate::common::text_of;
 
 /// Valid inputs and what the next steps need beside them.
 pub struct Seeds {
@@ -80,7 +81,6 @@ fn track_tables() -> Vec<Vec<u8>> {
 }
 
 fn presets() -> Vec<Vec<u8>> {
-    let generic = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/presets/generic.toml");
     let own = r#"name = "own"
 title = "own tracks"
 format = "csv"
@@ -117,7 +117,7 @@ columns = { vehicle = "id", length = "l" }
 file = "*_rec.csv"
 columns = { frame_rate = "fps" }
 "#;
-    vec![std::fs::read(generic).unwrap(), own.as_bytes().to_vec()]
+    vec![text_of("configs/presets/generic.toml").into_bytes(), own.as_bytes().to_vec()]
 }
 
 const INSTANTS: &str = "id,category,time_s,ego_speed_kmh,ego_length_m,ego_width_m,side,target_length_m,\
