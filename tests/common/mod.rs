@@ -57,6 +57,12 @@ pub fn numbers<T: serde::de::DeserializeOwned>(value: &serde_json::Value) -> Vec
     serde_json::from_value(value.clone()).unwrap()
 }
 
+/// The share of a smooth motion that is done after a share of its time.
+pub fn quintic(part: f64) -> f64 {
+    let p = part.clamp(0.0, 1.0);
+    p * p * p * (10.0 - 15.0 * p + 6.0 * p * p)
+}
+
 /// What `work` gives with so many threads.
 pub fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(work)

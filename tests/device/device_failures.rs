@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use crate::common::device::{lost_at, open, out_of_memory_at, patched, tampered};
-use crate::common::lane_sets::{self, swept_on_cpu};
+use crate::common::lane_sets::{of_model, swept_on_cpu};
 use lanesweep::Error;
 use lanesweep::engine::gpu::{GpuBackend, GpuOptions};
 use lanesweep::engine::verify::{SetOptions, random_plan};
@@ -13,8 +13,11 @@ use lanesweep::engine::{
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 
+/// Every pipeline takes its time to compile, and a failure is the same whatever the model.
+const TWO: [ModelId; 2] = [ModelId::Rss, ModelId::Fsm];
+
 fn plan() -> LanePlan {
-    random(40_000, SetOptions::default().seed, &ModelId::ALL)
+    random(20_000, SetOptions::default().seed, &TWO)
 }
 
 fn random(lanes: u64, seed: u64, models: &[ModelId]) -> LanePlan {
@@ -98,7 +101,7 @@ fn lanes_of_more_steps_than_a_device_runs_are_computed_all_the_same() {
     let profile = Profile::load("jrc-2021").unwrap();
     let mut long = profile.with_dt(0.001).unwrap();
     long.frame.time_cap_s = 120.0;
-    let plan = lane_sets::random(&long, 40);
+    let [plan, _] = of_model(&long, ModelId::Fsm, 40);
     let Some(gpu) = open(GpuOptions::default()) else { return };
     let (verdicts, summary) = swept(&plan, &gpu);
     assert!(verdicts == expected(&plan));
@@ -123,7 +126,7 @@ fn a_wrong_lane_stops_the_run_and_is_named() {
 #[test]
 fn sessions_of_one_device_do_not_disturb_one_another() {
     let Some(gpu) = open(GpuOptions { first_lanes: 200, ..Default::default() }) else { return };
-    let plans = [random(2000, 1, &ModelId::ALL), random(1500, 2, &[ModelId::Rss]), random(900, 3, &ModelId::ALL)];
+    let plans = [random(2000, 1, &TWO), random(1500, 2, &[ModelId::Rss]), random(900, 3, &TWO)];
     let cpu = CpuBackend::lane_arithmetic();
     std::thread::scope(|scope| {
         for plan in &plans {

@@ -8,6 +8,7 @@ use std::process::Command;
 use rayon::prelude::*;
 
 use crate::common::program::PROGRAM;
+use crate::common::with_threads;
 
 /// Runs the commands of a Markdown file, in order, in a folder, and returns where they print something else than stands
 /// there; `None` if they do not.
@@ -88,13 +89,13 @@ fn every_answer_and_every_mistake_is_told_as_it_stands_in_the_messages() {
     // The README's second command tests a program without Parquet.
     let needs_parquet = |line: &str| line.starts_with("$ ") && line.contains(".parquet");
     assert!(!texts.iter().any(|text| std::fs::read_to_string(text).unwrap().lines().any(needs_parquet)));
-    // A panic in a thread of the pool would be printed with another test, or not at all.
-    let differences = texts.par_iter().filter_map(|text| {
+    let of = |text: &&std::path::PathBuf| {
         let dir = tempfile::tempdir().unwrap();
         crate::common::program::copy(&text.with_extension("in"), dir.path());
         difference(text, dir.path())
-    });
-    let differences: Vec<String> = differences.collect();
+    };
+    // Threads of its own: those that all tests have would wait for the commands.
+    let differences: Vec<String> = with_threads(2, || texts.par_iter().filter_map(of).collect());
     assert!(differences.is_empty(), "{}", differences.join("\n\n"));
 }
 

@@ -6,7 +6,9 @@ use crate::common::{self, program};
 mod machine;
 mod workers;
 
-use crate::common::program::{ended, files, limited, names, ran, start, unbroken, wait_for_run, without_times, words};
+use crate::common::program::{
+    ended, files, limited, names, ran, said, start, unbroken, wait_for_run, without_times, words,
+};
 
 use std::path::{Path, PathBuf};
 
@@ -62,6 +64,23 @@ impl Bench {
         ran(self.path(), &format!("{run} --out {name}"));
         same(&self.path().join(name), &shared().join(name));
     }
+}
+
+#[test]
+fn an_interrupted_run_continues_and_ends_as_if_undisturbed() {
+    let bench = Bench::new();
+    let part = format!("{SAMPLE} --out parts --shard 0/1 --config run.stop_after_s=0.3");
+    for interruptions in 0.. {
+        let (code, said) = said(bench.path(), &part);
+        assert!(interruptions < 200, "every run must come further: {said}");
+        if code == 0 {
+            assert!(interruptions > 0, "the run is too short to be interrupted");
+            break;
+        }
+        assert!(code == 75 && said.contains("are done and kept") && said.contains("it continues"), "{code}: {said}");
+    }
+    ran(bench.path(), "-q merge parts");
+    super::parts::same(&shared().join("sample"), &bench.path().join("parts"));
 }
 
 #[test]

@@ -52,29 +52,6 @@ fn a_study_in_shards_is_the_study_in_one_piece() {
 }
 
 #[test]
-fn an_interrupted_run_continues_and_ends_as_if_undisturbed() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    write_cut_in_density(&dir.join("density.json"));
-    let long = "-q sample density.json --backend cpu --samples 1000000 --thw 0.6 --threads 1 --out";
-    ran(dir, &format!("{long} whole"));
-    let mut interruptions = 0;
-    loop {
-        let (code, _, err) = lanesweep(dir, &words(&format!("{long} parts --shard 0/1 --config run.stop_after_s=0.3")));
-        match code {
-            0 => break,
-            75 => assert!(flat(&err).contains("are done and kept") && err.contains("it continues"), "{err}"),
-            other => panic!("{other}: {err}"),
-        }
-        interruptions += 1;
-        assert!(interruptions < 200, "every run must come further: {err}");
-    }
-    assert!(interruptions > 0, "the run is too short to be interrupted");
-    ran(dir, "-q merge parts");
-    same(&dir.join("whole"), &dir.join("parts"));
-}
-
-#[test]
 fn parts_share_a_folder_and_keep_whole_runs_merges_and_themselves_out() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();

@@ -29,11 +29,8 @@ fn traffic() -> Recording {
 /// The recording with a column of `tracks` made anew from its value and the height of the box.
 fn changed(texts: &Texts, column: &str, change: impl Fn(f64, f64) -> f64) -> Texts {
     let mut tracks = Plain::of_text(&texts.tracks);
-    let at = tracks.at(column);
-    for row in 0..tracks.rows.len() {
-        let [value, height] = [column, "height"].map(|name| tracks.number(row, name));
-        tracks.rows[row][at] = format!("{:.2}", change(value, height));
-    }
+    let height = tracks.at("height");
+    tracks.map(column, |value, row| change(value, row[height].parse().unwrap()));
     Texts { tracks: tracks.text(), ..texts.clone() }
 }
 

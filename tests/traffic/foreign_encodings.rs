@@ -6,11 +6,11 @@ use std::path::Path;
 
 use lanesweep::model::plausibility::Implausible;
 use lanesweep::traffic::trajectory::highd;
-use lanesweep::traffic::trajectory::tracks::{self, Preset, TrackFile};
+use lanesweep::traffic::trajectory::tracks::{Preset, TrackFile};
 use lanesweep::traffic::trajectory::{InputFile, Inputs, Recording};
 
 use crate::common::exid::Plain;
-use crate::traffic::tracks::generated;
+use crate::traffic::tracks::{fact, generated, understood};
 
 fn table() -> Plain {
     let mut recording = generated();
@@ -137,13 +137,8 @@ fn times_in_any_notation_are_the_same_times() {
 
 #[test]
 fn what_a_time_without_a_unit_is_taken_for_is_said() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("own.csv");
-    fs::write(&path, with_times(|t| format!("{:.0}", 1_740_823_200_000.0 + 1000.0 * t)).text()).unwrap();
-    let generic = Preset::load("generic").unwrap();
-    let read = tracks::read_tracks(&TrackFile { path, id: "own".to_owned() }, &generic).unwrap();
-    let about = &read[0].understanding;
-    assert!(crate::traffic::tracks::fact(about, "columns").contains("time = t (ms since 1970)"), "{:?}", about.facts);
+    let about = understood(&with_times(|t| format!("{:.0}", 1_740_823_200_000.0 + 1000.0 * t))).unwrap();
+    assert!(fact(&about, "columns").contains("time = t (ms since 1970)"), "{:?}", about.facts);
 }
 
 #[test]

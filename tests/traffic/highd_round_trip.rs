@@ -5,6 +5,7 @@ use crate::common;
 use std::fs;
 
 use crate::common::dice::{Dice, cases};
+use crate::common::exid::Plain;
 use crate::common::small;
 use lanesweep::traffic::trajectory::highd;
 use lanesweep::traffic::trajectory::{Carriageway, Loaded, NO_LANE, Recording, Track, VehicleClass};
@@ -129,8 +130,9 @@ fn the_checksum_is_the_sha_256_of_the_whole_file() {
     assert_eq!(loaded.checksum_sha256[2].sha256, "88e3d2e2d572562aa604405e09046eb88c878d2f92c2f2f68623bcb201c383b0");
 }
 
+/// Columns may come in any order, and only the needed ones need to be there.
 #[test]
-fn windows_line_ends_a_byte_order_mark_and_blank_lines_change_nothing() {
+fn line_ends_a_byte_order_mark_blank_lines_and_the_order_of_columns_change_nothing() {
     let texts = small::Texts::small();
     let plain = texts.read().unwrap();
     let windows = |text: &str| text.replace('\n', "\r\n");
@@ -155,27 +157,15 @@ fn windows_line_ends_a_byte_order_mark_and_blank_lines_change_nothing() {
         assert_eq!(bits(&loaded.recording), bits(&plain.recording));
         assert_eq!(loaded.notes, plain.notes);
     }
-}
-
-#[test]
-fn columns_may_come_in_any_order_and_only_the_needed_ones_need_to_be_there() {
-    let texts = small::Texts::small();
-    let mut lines = texts.tracks.clone();
-    for column in ["width", "height", "yAcceleration", "dhw", "thw", "ttc", "precedingId", "leftAlongsideId"] {
-        lines = small::without_column(&lines, column);
-    }
-    let backwards: String =
-        lines.lines().map(|line| line.split(',').rev().collect::<Vec<_>>().join(",") + "\n").collect();
-    let reordered = small::Texts { tracks: backwards, ..texts.clone() };
-    assert_eq!(reordered.read().unwrap().recording, texts.read().unwrap().recording);
-}
-
-#[test]
-fn without_lane_ids_the_geometry_tells_the_lanes_and_a_note_says_so() {
-    let texts = small::Texts::small();
-    let without = small::Texts { tracks: small::without_column(&texts.tracks, "laneId"), ..texts.clone() };
-    let loaded = without.read().unwrap();
-    assert_eq!(loaded.recording, texts.read().unwrap().recording);
+    let without = |columns: &[&str]| Plain::of_text(&texts.tracks).without(columns);
+    let read = |tracks: Plain| small::Texts { tracks: tracks.text(), ..texts.clone() }.read().unwrap();
+    let unneeded = ["width", "height", "yAcceleration", "dhw", "thw", "ttc", "precedingId", "leftAlongsideId"];
+    let mut backwards = without(&unneeded);
+    std::iter::once(&mut backwards.header).chain(&mut backwards.rows).for_each(|row| row.reverse());
+    assert_eq!(read(backwards).recording, plain.recording);
+    // Without lane ids the geometry tells the lanes, and a note says so.
+    let loaded = read(without(&["laneId"]));
+    assert_eq!(loaded.recording, plain.recording);
     assert!(loaded.notes[0].contains("laneId"), "{:?}", loaded.notes);
 }
 

@@ -1,6 +1,7 @@
 //! What the miner must do with traffic whose every event is known, because it was put there.
 
 use crate::common::dice::{Dice, cases};
+use crate::common::quintic;
 use lanesweep::scenario::{Category, Scenario, Side};
 use lanesweep::traffic::mining::lateral::{LaneChangeKind, lane_changes};
 use lanesweep::traffic::mining::longitudinal::{Longitudinal, longitudinal_events};
@@ -45,8 +46,7 @@ impl Car {
         let (changed, after) = ((t.min(until) - from).max(0.0), (t - until).max(0.0));
         let dv = a * changed;
         let s = self.s0_m + self.v0_mps * t + 0.5 * dv * changed + dv * after;
-        let p = ((t - self.changes.0) / (self.changes.1 - self.changes.0)).clamp(0.0, 1.0);
-        let share = p * p * p * (10.0 - 15.0 * p + 6.0 * p * p);
+        let share = quintic((t - self.changes.0) / (self.changes.1 - self.changes.0));
         let d = self.from_m + share * (self.to_m - self.from_m);
         (s, d, self.v0_mps + dv, if from <= t && t < until { a } else { 0.0 })
     }
