@@ -1,14 +1,12 @@
 //! Lanes to compare backends with: profiles in which every option takes every form, and plans.
 use super::mined::scenarios_of;
 use lanesweep::engine::verify::{Comparison, SetOptions, compare, random_plan, threshold_plan};
-use lanesweep::engine::{
-    Backend, Chunk, Constants, CpuBackend, LaneCase, LanePlan, Outcome, Start, Step, Verdicts, Wanted, same_words,
-};
+use lanesweep::engine::{Backend, Chunk, Constants, LaneCase, LanePlan, Start, Step, Verdicts, same_words};
 use lanesweep::model::criterion::{BtnContact, BtnForm, LateralGate};
-use lanesweep::model::driver::ModelId;
-use lanesweep::model::profile::{CutOutEvaluated, CutOutTarget, Profile};
+use lanesweep::model::profile::{CutOutEvaluated, CutOutTarget};
 use lanesweep::model::scalar::Real;
-use lanesweep::run::study::{StudyOptions, plan_study};
+use lanesweep::prelude::*;
+use lanesweep::run::study::plan_study;
 use lanesweep::scenario::{Case, Tables};
 
 /// Every form of every option that decides how a lane runs, and other time steps and caps.

@@ -4,12 +4,10 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Arc, LazyLock, Mutex, OnceLock};
 
-use lanesweep::scenario::parameterization::Parameterization;
-use lanesweep::scenario::{Category, DataProvenance, Scenario};
-use lanesweep::stats::density::{DensityModel, FitOptions, write_density};
-use lanesweep::traffic::mining::{Collection, MiningOptions, mine, mine_generated};
-use lanesweep::traffic::trajectory::Recording;
-use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate, generate_one};
+use lanesweep::prelude::*;
+use lanesweep::scenario::DataProvenance;
+use lanesweep::traffic::mining::mine;
+use lanesweep::traffic::trajectory::generator::{generate, generate_one};
 use rayon::prelude::*;
 
 pub fn mined(recordings: usize) -> Collection {

@@ -1,11 +1,9 @@
 //! Plans and chunks without physics: every verdict is chosen by the test.
 use std::sync::Arc;
 
-use lanesweep::engine::{Block, CaseSource, Chunk, Headway, LaneCase, LanePlan, LaneRunner, Outcome, Verdicts};
-use lanesweep::model::criterion::Criterion;
-use lanesweep::model::driver::ModelId;
-use lanesweep::model::profile::Profile;
-use lanesweep::scenario::{Case, Category, Lateral, Participant, Speed, Tables};
+use lanesweep::engine::{Block, CaseSource, Chunk, LaneCase, LanePlan, LaneRunner, Verdicts};
+use lanesweep::prelude::*;
+use lanesweep::scenario::{Case, Lateral, Participant, Speed, Tables};
 
 struct OneCase(LaneCase<f64>, Tables<f64>);
 

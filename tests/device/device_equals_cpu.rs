@@ -6,12 +6,9 @@ use crate::common::lane_sets::{
 };
 use lanesweep::engine::gpu::{GpuOptions, Tampering};
 use lanesweep::engine::verify::{Comparison, SetOptions, compare, random_plan, self_check};
-use lanesweep::engine::{Backend, Headway, LanePlan, Wanted};
-use lanesweep::model::driver::ModelId;
-use lanesweep::model::profile::Profile;
+use lanesweep::engine::{Backend, LanePlan};
+use lanesweep::prelude::*;
 use lanesweep::run::grid::{CaseStyle, Grid, GridAxis, GridParts, GridPlan, MapParameter};
-use lanesweep::run::study::StudyOptions;
-use lanesweep::scenario::Category;
 
 /// The regulation's distance between vehicles, at speeds of every part of its table.
 fn at_the_minimum_following_distance() -> LanePlan {

@@ -4,14 +4,10 @@ use std::time::Duration;
 
 use crate::common::device::{lost_at, open, out_of_memory_at, patched, tampered};
 use crate::common::lane_sets::{of_model, swept_on_cpu};
-use lanesweep::Error;
 use lanesweep::engine::gpu::{GpuBackend, GpuOptions};
 use lanesweep::engine::verify::{SetOptions, random_plan};
-use lanesweep::engine::{
-    Backend, CpuBackend, Executor, LanePlan, Partial, RecheckOptions, SweepSummary, Verdicts, Wanted, same_words,
-};
-use lanesweep::model::driver::ModelId;
-use lanesweep::model::profile::Profile;
+use lanesweep::engine::{Backend, LanePlan, Partial, RecheckOptions, SweepSummary, Verdicts, same_words};
+use lanesweep::prelude::*;
 
 /// Every pipeline takes its time to compile, and a failure is the same whatever the model.
 const TWO: [ModelId; 2] = [ModelId::Rss, ModelId::Fsm];

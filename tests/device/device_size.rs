@@ -5,11 +5,9 @@ use std::sync::Arc;
 use crate::common::device::software_device;
 use crate::common::plans;
 use lanesweep::engine::gpu::{GpuBackend, GpuOptions};
-use lanesweep::engine::{CaseSource, Executor, Headway, LaneCase, LanePlan, Verdicts, Wanted};
-use lanesweep::model::criterion::Criterion;
-use lanesweep::model::driver::ModelId;
-use lanesweep::model::profile::Profile;
-use lanesweep::scenario::{Category, Tables};
+use lanesweep::engine::{CaseSource, LaneCase, LanePlan, Verdicts};
+use lanesweep::prelude::*;
+use lanesweep::scenario::Tables;
 
 /// Cases whose vehicle stands in the ego's lane or far beside it.
 struct Beside {

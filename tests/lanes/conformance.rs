@@ -3,14 +3,13 @@
 use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 
-use lanesweep::engine::{Constants, EndReason, LaneCase, NO_STEP, Outcome, Start, Step};
-use lanesweep::model::criterion::Criterion;
-use lanesweep::model::driver::{DriverProfile, ModelId};
-use lanesweep::model::profile::Profile;
+use lanesweep::engine::{Constants, EndReason, LaneCase, NO_STEP, Start, Step};
+use lanesweep::model::driver::DriverProfile;
 use lanesweep::model::scalar::Real;
+use lanesweep::prelude::*;
 use lanesweep::run::grid::jrc_case::{self, Front, NATIVE_THW_S, native_distance_fsm, native_distance_rss};
-use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions, recorded_case};
-use lanesweep::scenario::{Case, Category, Tables, read_scenarios};
+use lanesweep::scenario::parameterization::{ParameterizationOptions, recorded_case};
+use lanesweep::scenario::{Case, Tables};
 
 use crate::common;
 use crate::common::lane_sets::run_lane;

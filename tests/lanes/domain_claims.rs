@@ -1,13 +1,12 @@
 //! What must be true of the physics, whatever the numbers.
 
-use lanesweep::engine::{Constants, Headway, LaneCase, LaneKey, LaneRunner, Outcome, Start, Step};
-use lanesweep::model::criterion::{BrakeThreat, BtnForm, Contact, Criterion};
-use lanesweep::model::driver::ModelId;
-use lanesweep::model::profile::Profile;
+use lanesweep::engine::{Constants, LaneCase, LaneKey, LaneRunner, Start, Step};
+use lanesweep::model::criterion::{BrakeThreat, BtnForm, Contact};
 use lanesweep::model::scalar::Real;
-use lanesweep::run::study::{StudyOptions, plan_study};
-use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions, TimeGrid, recorded_case};
-use lanesweep::scenario::{Ahead, Case, Category, Lateral, Participant, Scenario, Speed, Tables};
+use lanesweep::prelude::*;
+use lanesweep::run::study::plan_study;
+use lanesweep::scenario::parameterization::{ParameterizationOptions, TimeGrid, recorded_case};
+use lanesweep::scenario::{Ahead, Case, Lateral, Participant, Speed, Tables};
 use serde_json::json;
 
 use crate::common::counting::Counting;

@@ -1,12 +1,9 @@
 //! Twenty cases of a type-approval kind, calculated by hand and compared with what `lanesweep check` says at a time step of
 //! 0.001 s; the verdicts are the same with the profile's own step, whose numbers the book prints.
 
-use lanesweep::engine::Headway;
-use lanesweep::model::criterion::Criterion;
-use lanesweep::model::driver::{BelowTrigger, CutInBraking, ModelId};
-use lanesweep::model::profile::Profile;
-use lanesweep::run::check::{Answer, Check, Demand, Holds, Judged, Judgement, Reading, RunEnd, Subject, Verdict};
-use lanesweep::scenario::{Category, PlainCase};
+use lanesweep::model::driver::{BelowTrigger, CutInBraking};
+use lanesweep::prelude::*;
+use lanesweep::run::check::{Answer, Demand, Holds, Judged, Judgement, Reading, RunEnd, Verdict};
 use lanesweep::stats::random::philox4x32_10;
 
 const KMH: f64 = 1.0 / 3.6;

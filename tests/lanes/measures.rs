@@ -1,11 +1,10 @@
 //! Values without a verdict: smallest THW, largest DRAC, TET, TIT, and the PET of a cut-in.
 
-use lanesweep::engine::{Constants, LaneRunner, Outcome, Start, Step};
+use lanesweep::engine::{Constants, LaneRunner, Start, Step};
 use lanesweep::model::criterion::BtnContact;
-use lanesweep::model::driver::ModelId;
-use lanesweep::model::profile::Profile;
 use lanesweep::model::scalar::Real;
-use lanesweep::scenario::{Case, Category, Lateral, Speed};
+use lanesweep::prelude::*;
+use lanesweep::scenario::{Case, Lateral, Speed};
 
 use crate::common::lane_sets::{random, run_case, run_lane};
 use crate::common::plans::beside;

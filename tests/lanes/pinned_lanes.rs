@@ -4,15 +4,13 @@ use sha2::{Digest, Sha256};
 
 use crate::common::lane_sets::{run_lane, swept};
 
-use lanesweep::engine::ENGINE_VERSION;
 use lanesweep::engine::verify::{SetOptions, random_plan, threshold_plan};
-use lanesweep::engine::{Backend, Constants, CpuBackend, Headway, LanePlan, Outcome, Start, Wanted, words};
-use lanesweep::model::driver::ModelId;
-use lanesweep::model::profile::Profile;
+use lanesweep::engine::{Backend, Constants, ENGINE_VERSION, LanePlan, Start, words};
+use lanesweep::prelude::*;
 use lanesweep::run::sampling::{SAMPLE_PURPOSE, generator_of};
-use lanesweep::run::study::{StudyOptions, plan_of_parts};
-use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions, Reduction, Sizes, SvdBasis};
-use lanesweep::scenario::{Category, Scenario, Tables};
+use lanesweep::run::study::plan_of_parts;
+use lanesweep::scenario::Tables;
+use lanesweep::scenario::parameterization::{ParameterizationOptions, Reduction, Sizes, SvdBasis};
 use lanesweep::stats::density::{Bandwidth, BandwidthRule, Kde, ParameterSpace, SearchEnd};
 use lanesweep::stats::random::Stream;
 use lanesweep::support::plain_text::hex;

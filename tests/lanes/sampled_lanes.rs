@@ -4,18 +4,15 @@ use crate::common;
 use crate::common::lane_sets::swept_on_cpu;
 use crate::common::mined::{density_of, provenance, scenarios_of};
 
-use lanesweep::engine::{Backend, CpuBackend, Headway, Instructions, LaneCase, LanePlan, Wanted, words};
-use lanesweep::model::criterion::Criterion;
-use lanesweep::model::driver::{MODELS, ModelId};
-use lanesweep::model::profile::Profile;
+use lanesweep::engine::{Backend, Instructions, LaneCase, LanePlan, words};
+use lanesweep::model::driver::MODELS;
+use lanesweep::prelude::*;
 use lanesweep::run::sampling::{
-    Estimator, SAMPLE_PURPOSE, SampleHeadways, SampleOptions, generator_of, generator_of_points, plan_points,
-    plan_samples,
+    Estimator, SAMPLE_PURPOSE, generator_of, generator_of_points, plan_points, plan_samples,
 };
-use lanesweep::run::study::{StudyOptions, plan_study};
-use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions};
-use lanesweep::scenario::{Category, Tables};
-use lanesweep::stats::density::{DensityModel, FitOptions};
+use lanesweep::run::study::plan_study;
+use lanesweep::scenario::Tables;
+use lanesweep::scenario::parameterization::ParameterizationOptions;
 use lanesweep::stats::random::Stream;
 
 fn density(category: Category, key: &str, with_thw: bool) -> DensityModel {

@@ -3,12 +3,8 @@
 use crate::common::plans::{self, chunk, mixed, plan};
 use crate::common::{golden_json, with_threads};
 use lanesweep::engine::{Confusion, LaneKey, LanePlan, Partial, Verdicts};
-use lanesweep::model::criterion::Criterion;
-use lanesweep::model::driver::ModelId;
-use lanesweep::run::score::{
-    ClaimVerdict, ScoreOptions, ScoreTable, best_parameterizations, check_claims, f1, precision, recall, score,
-};
-use lanesweep::scenario::Category;
+use lanesweep::prelude::*;
+use lanesweep::run::score::{ClaimVerdict, ScoreTable, best_parameterizations, check_claims, score};
 
 const LVD: &[&str] = &["i", "ii", "iii", "iv", "v"];
 

@@ -3,11 +3,9 @@
 use crate::common::lane_sets::{self, assert_same_in_calls, forms, random, small_study, swept, thresholds};
 use crate::common::mined::scenarios_of;
 use crate::common::with_threads;
-use lanesweep::engine::{Backend, CpuBackend, Headway, Instructions, LanePlan, Wanted};
-use lanesweep::model::driver::ModelId;
-use lanesweep::model::profile::Profile;
-use lanesweep::run::study::{StudyOptions, plan_study};
-use lanesweep::scenario::{Category, Scenario};
+use lanesweep::engine::{Backend, Instructions, LanePlan};
+use lanesweep::prelude::*;
+use lanesweep::run::study::plan_study;
 
 /// Batches on every instruction set of this machine.
 fn in_batches() -> Vec<CpuBackend> {

@@ -4,11 +4,10 @@ use std::collections::{BTreeMap, HashSet};
 
 use crate::common::lane_sets::{self, run_lane, swept_on_cpu};
 use lanesweep::engine::verify::{SetOptions, Threshold, random_plan};
-use lanesweep::engine::{Constants, EndReason, LaneCase, LanePlan, Step, Wanted};
-use lanesweep::model::criterion::Criterion;
-use lanesweep::model::driver::{ModelId, View};
-use lanesweep::model::profile::Profile;
-use lanesweep::scenario::{Category, LATERAL_SAMPLED, SPEED_SAMPLED};
+use lanesweep::engine::{Constants, EndReason, LaneCase, LanePlan, Step};
+use lanesweep::model::driver::View;
+use lanesweep::prelude::*;
+use lanesweep::scenario::{LATERAL_SAMPLED, SPEED_SAMPLED};
 
 fn random(name: &str, lanes: u64) -> LanePlan {
     lane_sets::random(&Profile::load(name).unwrap(), lanes)

@@ -2,13 +2,8 @@
 
 use crate::common::mined;
 use lanesweep::Place;
-use lanesweep::engine::{CpuBackend, Executor, Headway};
-use lanesweep::model::criterion::Criterion;
-use lanesweep::model::driver::ModelId;
-use lanesweep::model::profile::Profile;
-use lanesweep::run::sampling::{EstimateRow, Estimator, Sample, SampleHeadways, SampleOptions};
-use lanesweep::scenario::{Category, Scenario};
-use lanesweep::stats::density::DensityModel;
+use lanesweep::prelude::*;
+use lanesweep::run::sampling::{EstimateRow, Estimator};
 use lanesweep::stats::estimate::{Verdict, Warning};
 
 fn density_of(key: &str, with_thw: bool) -> DensityModel {

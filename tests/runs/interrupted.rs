@@ -7,10 +7,7 @@ use std::time::{Duration, Instant};
 
 use crate::common::lane_sets::random;
 use crate::common::program::{self, names, send, start, wait_for_run, wait_until, words};
-use lanesweep::Error;
-use lanesweep::engine::{CpuBackend, Executor, Wanted};
-use lanesweep::model::profile::Profile;
-use lanesweep::support::cancel::Cancel;
+use lanesweep::prelude::*;
 
 fn unfinished(dir: &Path) -> Vec<String> {
     names(dir).into_iter().filter(|name| name.ends_with(".part")).collect()

@@ -4,16 +4,12 @@ use crate::common::dice::cases;
 use crate::common::lane_sets::run_case;
 use crate::common::program::{json, ran, table};
 
-use lanesweep::engine::{CpuBackend, Executor, Headway, Start, Verdicts};
-use lanesweep::model::criterion::Criterion;
-use lanesweep::model::driver::ModelId;
-use lanesweep::model::profile::Profile;
+use lanesweep::engine::{Start, Verdicts};
+use lanesweep::prelude::*;
 use lanesweep::run::grid::presets::{self, Presets};
 use lanesweep::run::grid::{
-    CaseQuantity, CellOutcome, Grid, GridAxis, GridMap, GridParts, GridPlan, Map, MapGrids, MapOptions, MapParameter,
-    boundary,
+    CaseQuantity, CellOutcome, Grid, GridAxis, GridMap, GridParts, GridPlan, MapGrids, MapParameter, boundary,
 };
-use lanesweep::scenario::Category;
 
 fn axis(category: Category, text: &str) -> GridAxis {
     GridAxis::parse(category, text, "--x").unwrap()

@@ -1,12 +1,10 @@
 //! `--thw observed`: each scenario from its recorded gap.
 
 use crate::common::mined::{density_of, kept, mined, scenarios_of};
-use lanesweep::Error;
-use lanesweep::engine::{Headway, LaneKey, LaneRunner};
-use lanesweep::model::profile::Profile;
-use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, plan_samples};
-use lanesweep::run::study::{StudyOptions, plan_study};
-use lanesweep::scenario::Category;
+use lanesweep::engine::{LaneKey, LaneRunner};
+use lanesweep::prelude::*;
+use lanesweep::run::sampling::{Estimator, plan_samples};
+use lanesweep::run::study::plan_study;
 
 fn observed() -> StudyOptions {
     StudyOptions { headways: vec![Headway::Observed], ..StudyOptions::default() }

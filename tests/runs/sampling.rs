@@ -7,13 +7,12 @@ use crate::common::{self, program};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use lanesweep::engine::{Backend, CpuBackend, Executor, Headway, SampleTally, Wanted};
-use lanesweep::model::criterion::Criterion;
-use lanesweep::model::driver::{MODELS, ModelId};
-use lanesweep::model::profile::Profile;
-use lanesweep::run::sampling::{Estimator, Sample, SampleHeadways, SampleOptions, plan_samples};
-use lanesweep::scenario::{Category, Driven};
-use lanesweep::stats::density::{Bandwidth, DensityModel, Exposure, Kde, write_density};
+use lanesweep::engine::{Backend, SampleTally};
+use lanesweep::model::driver::MODELS;
+use lanesweep::prelude::*;
+use lanesweep::run::sampling::{Estimator, plan_samples};
+use lanesweep::scenario::Driven;
+use lanesweep::stats::density::{Bandwidth, Exposure, Kde};
 use lanesweep::stats::estimate::Search;
 
 fn density(category: Category, key: &str) -> DensityModel {

@@ -1,9 +1,8 @@
 //! The scenario file: what is written is read to the last bit.
 
 use lanesweep::model::plausibility::Implausible;
-use lanesweep::scenario::{
-    Category, Ego, Other, Scenario, Side, read_scenario_file, read_scenarios, write_scenarios, write_scenarios_to,
-};
+use lanesweep::prelude::*;
+use lanesweep::scenario::{Ego, Other, Side, read_scenario_file, write_scenarios_to};
 
 use crate::common;
 use crate::common::dice::{Dice, cases};

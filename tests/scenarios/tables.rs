@@ -10,8 +10,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use lanesweep::model::plausibility::LIMITS;
-use lanesweep::scenario::Category;
-use lanesweep::stats::density::write_density;
+use lanesweep::prelude::*;
 use made::{Read, read};
 
 #[test]

@@ -3,13 +3,11 @@
 use crate::common::mined::{self, scenarios_of};
 use crate::common::{golden_json, numbers, with_threads};
 
-use lanesweep::scenario::parameterization::{
-    Family, Parameterization, ParameterizationOptions, Reduction, Sizes, SvdLateral, Variable,
-};
-use lanesweep::scenario::{Case, Category, DataProvenance, Driven, Lateral, Scenario, Side};
+use lanesweep::prelude::*;
+use lanesweep::scenario::parameterization::{Family, ParameterizationOptions, Reduction, Sizes, SvdLateral, Variable};
+use lanesweep::scenario::{Case, DataProvenance, Driven, Lateral, Side};
 use lanesweep::stats::density::{
-    Bandwidth, BandwidthRule, DensityModel, FitOptions, Kde, LeaveOneOut, ParameterSpace, SearchEnd, ValidFraction,
-    normal_cdf, read_density, write_density,
+    Bandwidth, BandwidthRule, Kde, LeaveOneOut, ParameterSpace, SearchEnd, ValidFraction, normal_cdf,
 };
 use lanesweep::stats::random::Stream;
 use rayon::prelude::*;

@@ -2,13 +2,11 @@
 
 use crate::common::mined::{self, provenance, scenarios_of};
 
-use lanesweep::model::profile::Profile;
+use lanesweep::prelude::*;
 use lanesweep::run::sampling::{SAMPLE_PURPOSE, generator_of};
 use lanesweep::scenario::parameterization::{
-    Parameterization, ParameterizationOptions, ReducedScenario, Reduction, SeriesScale, SvdBasis, SvdLateral, fit_svd,
+    ParameterizationOptions, ReducedScenario, Reduction, SeriesScale, SvdBasis, SvdLateral, fit_svd,
 };
-use lanesweep::scenario::{Category, Scenario};
-use lanesweep::stats::density::{DensityModel, FitOptions};
 use lanesweep::stats::random::Stream;
 
 fn kept(category: Category) -> Vec<&'static Scenario> {

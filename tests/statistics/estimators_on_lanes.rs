@@ -7,16 +7,9 @@ use crate::common::reliability::adaptive;
 
 use std::path::PathBuf;
 
-use lanesweep::engine::{CpuBackend, Executor, Headway};
-use lanesweep::model::criterion::Criterion;
-use lanesweep::model::driver::ModelId;
-use lanesweep::model::profile::Profile;
-use lanesweep::run::sampling::{Estimator, LaneLimitState, Question, Sample, SampleHeadways, SampleOptions, truncated};
-use lanesweep::scenario::parameterization::Parameterization;
-use lanesweep::scenario::{Category, Scenario};
-use lanesweep::stats::density::{DensityModel, FitOptions, read_density};
+use lanesweep::prelude::*;
+use lanesweep::run::sampling::{Estimator, LaneLimitState, Question, truncated};
 use lanesweep::stats::estimate::{Estimate, Goal, Search, Verdict, wilson};
-use lanesweep::traffic::mining::{MiningOptions, mine_folder};
 
 const LEVEL: f64 = 0.999;
 

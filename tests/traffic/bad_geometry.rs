@@ -3,10 +3,9 @@
 use crate::common::exid::Plain;
 use crate::common::small::{self, Texts, cruising};
 
-use lanesweep::Error;
 use lanesweep::model::plausibility::Implausible;
-use lanesweep::traffic::trajectory::highd;
-use lanesweep::traffic::trajectory::{Recording, Track};
+use lanesweep::prelude::*;
+use lanesweep::traffic::trajectory::{Track, highd};
 
 /// Ten vehicles in five lanes of both directions, 2.4 s; each sways across its lane.
 fn traffic() -> Recording {

@@ -5,15 +5,11 @@ mod traffic;
 use std::sync::LazyLock;
 
 use crate::common::mined::recordings;
-use lanesweep::engine::{CpuBackend, Executor};
-use lanesweep::model::profile::Profile;
-use lanesweep::run::parts::Job;
+use lanesweep::prelude::*;
 use lanesweep::run::score::published_failures;
-use lanesweep::run::study::Study;
-use lanesweep::scenario::{Category, Scenario};
-use lanesweep::traffic::mining::{Mined, MiningOptions, mine, mine_generated};
-use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate};
-use lanesweep::traffic::trajectory::{Recording, VehicleClass};
+use lanesweep::traffic::mining::{Mined, mine};
+use lanesweep::traffic::trajectory::VehicleClass;
+use lanesweep::traffic::trajectory::generator::generate;
 use rayon::prelude::*;
 use traffic::{Traffic, class_index, mean, measure, mode, noise_sd_and_correlation, quantile, share};
 

@@ -3,9 +3,8 @@
 use std::sync::OnceLock;
 
 use lanesweep::model::plausibility::Implausible;
-use lanesweep::scenario::Category;
-use lanesweep::traffic::mining::{MiningOptions, count, mine, mine_loaded};
-use lanesweep::traffic::trajectory::Recording;
+use lanesweep::prelude::*;
+use lanesweep::traffic::mining::{count, mine, mine_loaded};
 
 use crate::common::exid::Plain;
 use crate::traffic::tracks::{read_by, shorter, understood};

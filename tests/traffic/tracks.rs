@@ -4,15 +4,14 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use lanesweep::model::plausibility::Implausible;
-use lanesweep::scenario::{Category, Scenario};
+use lanesweep::prelude::*;
 use lanesweep::traffic::Source;
-use lanesweep::traffic::mining::{Collection, MiningOptions, mine};
-use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
-use lanesweep::traffic::trajectory::highd;
+use lanesweep::traffic::mining::mine;
+use lanesweep::traffic::trajectory::generator::generate_one;
 use lanesweep::traffic::trajectory::tracks::{
     self, HeadingOrigin, LoadedTracks, Preset, Reference, RoadSource, Role, Side, TrackFile, Understanding,
 };
-use lanesweep::traffic::trajectory::{Carriageway, Inputs, Loaded, NO_LANE, Recording, Track, VehicleClass};
+use lanesweep::traffic::trajectory::{Carriageway, Inputs, Loaded, NO_LANE, Track, VehicleClass, highd};
 
 use crate::common::exid::{self, Plain};
 use crate::common::mined::recordings;

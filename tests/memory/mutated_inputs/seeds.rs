@@ -4,18 +4,13 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
-use lanesweep::engine::{Backend, CpuBackend, SampleTally, Wanted};
-use lanesweep::model::profile::Profile;
+use lanesweep::engine::{Backend, SampleTally};
+use lanesweep::prelude::*;
 use lanesweep::run::parts::{Counted, Journal, MergeableCounts, Part, seal, write_part};
 use lanesweep::run::sampling::{SampleCounts, proposal_text};
-use lanesweep::run::study::{StudyOptions, outline_study};
+use lanesweep::run::study::outline_study;
 use lanesweep::scenario::parameterization::ParameterizationOptions;
-use lanesweep::scenario::{Category, Scenario, write_scenarios};
 use lanesweep::scenario::{DataProvenance, Driven};
-use lanesweep::stats::density::{DensityModel, write_density};
-use lanesweep::traffic::mining::{MiningOptions, mine_generated};
-use lanesweep::traffic::trajectory::Recording;
-use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
 use super::readers::{PART_UNITS, small_plan};
 use super::small;

@@ -6,10 +6,9 @@ use std::path::Path;
 use std::time::Duration;
 
 use crate::common::lane_sets::random;
-use lanesweep::engine::{Backend, Chunk, CpuBackend, Executor, LanePlan, Partial, Session, Wanted};
-use lanesweep::model::profile::Profile;
+use lanesweep::engine::{Backend, Chunk, LanePlan, Partial, Session};
+use lanesweep::prelude::*;
 use lanesweep::run::parts::{Journal, Ledger};
-use lanesweep::{Error, Result};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Failure {
