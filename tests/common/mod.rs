@@ -35,6 +35,15 @@ pub fn skipped(why: &str) {
     let _ = writeln!(std::io::stderr(), "SKIPPED: {why}");
 }
 
+/// A table with a row per concrete case, as users write it.
+pub const CASES: &str =
+    "id,category,models,ego_speed_kmh,speed_mps,thw,gap,lateral_speed,acceleration,end_speed,ahead_gap,\
+ahead_speed_kmh,duration_s,rate_hz
+a,cut-in,FSM,108,20,1.2,,1.0,,,,,,
+,lvd,RSS,108,30,,30,,-6,0,,,,10
+c,cut-out,FSM,108,,1.2,,1.0,,,40,36,4,
+";
+
 pub fn in_crate(path: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(path)
 }

@@ -8,21 +8,16 @@ use lanesweep::engine::gpu::{GpuOptions, Tampering};
 use lanesweep::engine::verify::{Comparison, SetOptions, compare, random_plan, self_check};
 use lanesweep::engine::{Backend, LanePlan};
 use lanesweep::prelude::*;
-use lanesweep::run::grid::{CaseStyle, Grid, GridAxis, GridParts, GridPlan, MapParameter};
+use lanesweep::run::grid::{Grid, GridAxis, GridParts, GridPlan, MapParameter};
 
 /// The regulation's distance between vehicles, at speeds of every part of its table.
 fn at_the_minimum_following_distance() -> LanePlan {
     let axis = |text| GridAxis::parse(Category::CutIn, text, "axis").unwrap();
+    let (x, y) = (axis("ego_speed_kmh=1..130/3"), axis("lateral_speed_mps=0.3..1.8/0.5"));
     let grid = Grid::new(GridParts {
-        name: "following".to_owned(),
-        category: Category::CutIn,
-        x: axis("ego_speed_kmh=1..130/3"),
-        y: axis("lateral_speed_mps=0.3..1.8/0.5"),
         panel_axes: vec![axis("other_speed_kmh=0..40/20")],
         fixed: vec![(MapParameter::find(Category::CutIn, "gap_m", "test").unwrap(), 0.0)],
-        style: CaseStyle::Plain,
-        native_gap: false,
-        closing_only: false,
+        ..GridParts::new("following", Category::CutIn, x, y)
     });
     let profile = Profile::load("un-r157").unwrap();
     let mut plan = GridPlan::new(grid.unwrap(), &profile, &ModelId::ALL).unwrap().parts.remove(0).plan;

@@ -12,8 +12,10 @@ fn part(plan: &LanePlan, units: std::ops::Range<u64>, lane: &dyn Fn(u64) -> Verd
     Partial::from_chunk(plan, &chunk(plan, units, &|l| (lane(l), 1.0), false)).unwrap()
 }
 
-fn table(plan: &LanePlan, lane: &dyn Fn(u64) -> Verdicts) -> ScoreTable {
-    score(plan, &part(plan, 0..plan.unit_count(), lane), &ScoreOptions::default()).unwrap()
+fn scored(plan: &LanePlan, lane: &dyn Fn(u64) -> Verdicts) -> (Partial, ScoreTable) {
+    let counts = part(plan, 0..plan.unit_count(), lane);
+    let table = score(plan, &counts, &ScoreOptions::default()).unwrap();
+    (counts, table)
 }
 
 /// S fails at random; each variant repeats S but for a share (per mille) of lanes, where it is turned round.
@@ -51,8 +53,7 @@ fn claims_are_judged_by_scenarios_and_need_enough_of_them() {
             let fails = key.unit < failing[key.model] && key.variant != 3 && !(is_d_bad && key.variant == 4);
             Verdicts(if fails { 0b111 } else { 0 })
         };
-        let counts = part(&plan, 0..400, &lane);
-        let table = score(&plan, &counts, &ScoreOptions::default()).unwrap();
+        let (counts, table) = scored(&plan, &lane);
         check_claims(&table, &plan, &counts).into_iter().find(|of| of.claim.id == id).unwrap().verdict
     };
     for (id, failing, is_d_bad, expected) in [
@@ -72,7 +73,7 @@ fn claims_are_judged_by_scenarios_and_need_enough_of_them() {
 fn the_interval_covers_the_value_and_shrinks_with_the_number_of_scenarios() {
     let width = |units| {
         let plan = plan(&[(Category::Lvd, units, LVD)]);
-        let table = table(&plan, &noisy(&plan, &[100, 100, 100, 100, 100]));
+        let (_, table) = scored(&plan, &noisy(&plan, &[100, 100, 100, 100, 100]));
         let scores = &table.categories[0];
         let cell = &scores.cells[scores.index(2, ModelId::Rss, Criterion::Btn).unwrap()];
         let (value, interval) = (f1(&cell.counts).unwrap(), cell.f1_interval.unwrap());
@@ -92,8 +93,7 @@ fn the_best_of_equals_is_the_first_and_no_data_tells_it_from_the_others() {
         let variant = key.variant.min(3);
         noisy(&plan, &[400, 400, 50, 50, 50])(plan.lane(&LaneKey { variant, ..key }))
     };
-    let counts = part(&plan, 0..60, &twins);
-    let table = score(&plan, &counts, &ScoreOptions::default()).unwrap();
+    let (counts, table) = scored(&plan, &twins);
     for best in best_parameterizations(&table, &plan, &counts, Criterion::Ttc) {
         assert_eq!(best.data_for_decision, None, "no data does");
         let score = best.score.unwrap();
@@ -107,8 +107,7 @@ fn a_best_parameterization_needs_ten_failing_scenarios() {
     let plan = plan(&[(Category::Lvd, 60, LVD)]);
     let best = |failing: u64| {
         let lane = |lane: u64| Verdicts(if plan.key(lane).unwrap().unit < failing { 7 } else { 0 });
-        let counts = part(&plan, 0..60, &lane);
-        let table = score(&plan, &counts, &ScoreOptions::default()).unwrap();
+        let (counts, table) = scored(&plan, &lane);
         assert!(failing > 0 || table.categories[0].cells[0].f1_interval.is_none(), "an interval of nothing");
         let best = best_parameterizations(&table, &plan, &counts, Criterion::Collision).swap_remove(0);
         (best.failures, best.failing_scenarios, best.score.is_some(), best.data_for_decision)
@@ -126,8 +125,8 @@ fn threads_and_chunks_do_not_change_a_bit() {
     let parts = part(&plan, 21..35, &lane).merge(part(&plan, 0..3, &lane)).unwrap();
     let parts = parts.merge(part(&plan, 3..21, &lane)).unwrap();
     assert_eq!(whole, parts);
-    let scored = |partial: &Partial| score(&plan, partial, &ScoreOptions::default()).unwrap();
-    let (one, two) = (with_threads(1, || scored(&whole)), with_threads(2, || scored(&parts)));
+    let of = |partial: &Partial| score(&plan, partial, &ScoreOptions::default()).unwrap();
+    let (one, two) = (with_threads(1, || of(&whole)), with_threads(2, || of(&parts)));
     assert_eq!(one, two);
     assert_eq!(check_claims(&one, &plan, &whole), check_claims(&two, &plan, &parts));
 }
@@ -164,7 +163,7 @@ fn the_papers_lvd_f1_follow_from_their_integer_counts() {
 fn a_plan_without_variants_or_with_one_scenario_scores_without_a_panic() {
     for blocks in [&[(Category::Lvd, 1, LVD)][..], &[(Category::CutIn, 1, &[])], &[(Category::Lvd, 0, LVD)]] {
         let plan = plan(blocks);
-        let counts = part(&plan, 0..plan.unit_count(), &|lane| Verdicts((lane % 8) as u8));
-        check_claims(&score(&plan, &counts, &ScoreOptions::default()).unwrap(), &plan, &counts);
+        let (counts, table) = scored(&plan, &|lane| Verdicts((lane % 8) as u8));
+        check_claims(&table, &plan, &counts);
     }
 }

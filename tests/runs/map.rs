@@ -15,16 +15,12 @@ fn axis(category: Category, text: &str) -> GridAxis {
     GridAxis::parse(category, text, "--x").unwrap()
 }
 
-fn value(category: Category, key: &str, value: f64) -> (&'static MapParameter, f64) {
-    (MapParameter::find(category, key, "--set").unwrap(), value)
-}
-
 /// A grid of these axes (x, then y), panels and fixed values.
 fn grid(category: Category, axes: &str, panels: &str, fixed: &str) -> Grid {
     let (x, y) = axes.split_once(' ').unwrap();
     let fixed = fixed.split_whitespace().map(|text| {
         let (key, number) = text.split_once('=').unwrap();
-        value(category, key, number.parse().unwrap())
+        (MapParameter::find(category, key, "--set").unwrap(), number.parse().unwrap())
     });
     let panel_axes = panels.split_whitespace().map(|text| axis(category, text)).collect();
     Grid::new(GridParts { panel_axes, fixed: fixed.collect(), ..parts(category, x, y) }).unwrap()
@@ -49,14 +45,6 @@ fn swept(plan: &GridPlan) -> GridMap {
 
 fn mapped(grid: Grid, profile: &Profile, models: &[ModelId]) -> GridMap {
     swept(&GridPlan::new(grid, profile, models).unwrap())
-}
-
-fn percent(map: &GridMap, model: usize) -> f64 {
-    100.0 * map.failures(model, Criterion::Collision) as f64 / map.cell_count() as f64
-}
-
-fn undecided_cells(map: &GridMap, model: usize) -> u64 {
-    map.outcomes(model, Criterion::Collision)[CellOutcome::Undecided as usize]
 }
 
 #[test]
@@ -169,15 +157,12 @@ fn moved(grid: &Grid, gap_m: f64, lateral_mps: f64) -> Grid {
         GridAxis { parameter: axis.parameter, values: axis.values.iter().map(|v| (v + by).max(0.0)).collect() }
     };
     Grid::new(GridParts {
-        name: grid.name.clone(),
-        category: grid.category,
-        x: shifted(&grid.x),
-        y: shifted(&grid.y),
         panel_axes: grid.panel_axes.to_vec(),
         fixed: grid.fixed.to_vec(),
         style: grid.style,
         native_gap: grid.native_gap,
         closing_only: grid.category == Category::CutIn,
+        ..GridParts::new(&grid.name, grid.category, shifted(&grid.x), shifted(&grid.y))
     })
     .unwrap()
 }
@@ -210,7 +195,7 @@ fn crash_shares_of_the_jrc_are_known_as_far_as_rounding_does_not_decide() {
             let always = cells().filter(|(ours, others)| *ours && others.clone().all(|f| f)).count();
             let ever = cells().filter(|(ours, others)| *ours || others.clone().any(|f| f)).count();
             let [always, ever] = [always, ever].map(|n| 100.0 * n as f64 / ours.len() as f64);
-            let share = percent(&nominal, at);
+            let share = 100.0 * nominal.failures(at, Criterion::Collision) as f64 / ours.len() as f64;
             println!(
                 "{:12} {:7} {share:6.2} %, known {known:4.1} %, rounding decides between {always:6.2} and {ever:6.2} %",
                 preset.grid.name,
@@ -271,7 +256,7 @@ fn a_cell_is_undecided_where_the_single_case_is() {
         assert!(is_undecided || flips.is_empty(), "cell {cell}: {flips:?}");
         assert!(!is_undecided || !flips.is_empty() || !judged.flips.is_empty(), "cell {cell}: {:?}", judged.flips);
     }
-    assert!(undecided_cells(map, 0) > 0);
+    assert!(map.outcomes(0, Criterion::Collision)[CellOutcome::Undecided as usize] > 0);
 }
 
 /// Every preset: a cell without a conflict is one whose single case `check` answers with the same word, from the same gap.

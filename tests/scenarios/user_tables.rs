@@ -1,8 +1,8 @@
 //! Tables of scenarios and cases that users make: what is read of them (what is refused: `tests/messages/tables.md`).
 #![cfg(feature = "parquet")]
 
-use crate::common::made;
 use crate::common::program::{ran, said};
+use crate::common::{CASES, made};
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -46,14 +46,6 @@ fn a_row_per_instant_makes_scenarios_with_converted_units_and_the_rate_of_their_
     let sheet = format!("{sheet}{}\n", ";".repeat(sheet.lines().next().unwrap().matches(';').count()));
     assert_eq!(format!("{read:?}"), format!("{:?}", of("s.csv", &sheet).unwrap()));
 }
-
-const CASES: &str =
-    "id,category,models,ego_speed_kmh,speed_mps,thw,gap,lateral_speed,acceleration,end_speed,ahead_gap,\
-ahead_speed_kmh,duration_s,rate_hz
-a,cut-in,FSM,108,20,1.2,,1.0,,,,,,
-,lvd,RSS,108,30,,30,,-6,0,,,,10
-c,cut-out,FSM,108,,1.2,,1.0,,,40,36,4,
-";
 
 fn before_end(series: &str) -> Vec<f64> {
     let steps: Vec<&str> = series.lines().skip(1).collect();

@@ -79,12 +79,23 @@ fn sums_of_a_proposal_are_the_same_bits_in_any_division_of_the_indices() {
     assert_eq!(with_threads(1, || of(0..20_000)), whole);
 }
 
+/// Of the first question, within a fraction of the truth.
+fn assert_found(
+    what: &str,
+    density: &dyn Density,
+    limit_state: &dyn LimitState,
+    seed: u64,
+    (truth, by): (f64, f64),
+) -> Estimate {
+    let estimate = found(density, limit_state, seed).0.remove(0);
+    assert!((estimate.probability / truth - 1.0).abs() < by, "{what}: {estimate:?} beside {truth}");
+    estimate
+}
+
 #[test]
 fn a_search_finds_the_linear_limit_s_probability_in_any_dimension() {
     for (beta, dimensions) in [(2.0, 2), (3.5, 5), (5.0, 10)] {
-        let (estimates, _) = found(&StandardNormal { dimensions }, &linear(beta), 3);
-        let estimate = &estimates[0];
-        assert!((estimate.probability / tail(beta) - 1.0).abs() < 0.15, "{estimate:?}");
+        let estimate = assert_found("linear", &StandardNormal { dimensions }, &linear(beta), 3, (tail(beta), 0.15));
         // A million draws of the density do not exclude other failures of a probability below 3.7e-6.
         let is_bounded = tail(beta) > 7.4e-6;
         assert_eq!(estimate.trust.draws() == Verdict::Sound, is_bounded, "{estimate:?}");
@@ -130,9 +141,7 @@ fn failures_in_the_tails_do_not_hide_more_likely_ones() {
     };
     let truth = tail(4.2) + tail(6.0);
     for seed in 0..2 {
-        let (estimates, _) = found(&StandardNormal { dimensions: 2 }, &pocket, seed);
-        let estimate = &estimates[0];
-        assert!((estimate.probability / truth - 1.0).abs() < 0.3, "{seed}: {estimate:?}");
+        assert_found("pocket", &StandardNormal { dimensions: 2 }, &pocket, seed, (truth, 0.3));
     }
 }
 
@@ -167,7 +176,6 @@ fn a_search_has_the_same_bits_with_one_thread() {
 #[test]
 fn a_truncated_density_is_searched_within_its_valid_region() {
     let half = Truncated::with_validity(unit_mixture(2), |x: &[f64]| x[1] > 0.0, 0.5).unwrap();
-    let (estimates, _) = found(&half, &linear(4.0), 4);
     // x₀ + x₁ > 4√2 with x₁ > 0: most of the tail, twice its density.
     let truth = {
         let (steps, width) = (200_000, 12.0 / 200_000.0);
@@ -175,7 +183,7 @@ fn a_truncated_density_is_searched_within_its_valid_region() {
         let of = |i: i32| (f64::from(i) + 0.5) * width;
         2.0 * (0..steps).map(|i| density(of(i)) * tail(4.0 * std::f64::consts::SQRT_2 - of(i)) * width).sum::<f64>()
     };
-    assert!((estimates[0].probability / truth - 1.0).abs() < 0.15, "{:?} beside {truth}", estimates[0]);
+    assert_found("half", &half, &linear(4.0), 4, (truth, 0.15));
 }
 
 #[test]

@@ -15,7 +15,7 @@ use lanesweep::scenario::{DataProvenance, Driven};
 use super::readers::{PART_UNITS, small_plan};
 use super::small;
 use crate::common::mined::{fitted, provenance};
-use crate::common::text_of;
+use crate::common::{CASES, text_of};
 
 /// Valid inputs and what the next steps need beside them.
 pub struct Seeds {
@@ -122,14 +122,6 @@ a,cut-in,10.04,107,4.5,1.8,left,4.2,1.9,72,3.4,,
 a,cut-in,10.08,106,4.5,1.8,left,4.2,1.9,90,3.3,,
 b,lvd,0,90,4.5,1.8,Right,4.2,1.9,90,0,1,
 b,,0.1,,,,,,,36,0.1,,
-";
-
-const CASES: &str =
-    "id,category,models,ego_speed_kmh,speed_mps,thw,gap,lateral_speed,acceleration,end_speed,ahead_gap,\
-ahead_speed_kmh,duration_s,rate_hz
-a,cut-in,FSM,108,20,1.2,,1.0,,,,,,
-,lvd,RSS,108,30,,30,,-6,0,,,,10
-c,cut-out,FSM,108,,1.2,,1.0,,,40,36,4,
 ";
 
 impl Seeds {
