@@ -178,39 +178,26 @@ fn geographic_coordinates_are_named_as_such() {
 #[cfg(feature = "parquet")]
 #[test]
 fn parquet_with_gzip_or_lz4_and_microseconds_is_the_table_and_instants_are_refused() {
-    use std::sync::Arc;
-
-    use arrow_array::{ArrayRef, Float64Array, Int64Array, StringArray, TimestampMicrosecondArray};
+    use arrow_array::cast::AsArray;
+    use arrow_array::types::{Int64Type, TimestampMicrosecondType};
     use parquet::basic::{Compression, GzipLevel};
 
-    let table = table();
-    let right = from_frame_0(read("own.csv", table.text().as_bytes()).unwrap());
-    let column = |name: &String, are_instants: bool| -> ArrayRef {
-        let at = table.at(name);
-        let texts = || table.rows.iter().map(move |row| row[at].as_str());
-        let numbers = || texts().map(|text| text.parse::<f64>().unwrap());
-        match name.as_str() {
-            "class" | "track_id" => Arc::new(StringArray::from_iter_values(texts())),
-            "t" => {
-                let instants = numbers().map(|t| 1_740_823_200_000_000 + (1e6 * t).round() as i64);
-                match are_instants {
-                    true => Arc::new(TimestampMicrosecondArray::from_iter_values(instants)),
-                    false => Arc::new(Int64Array::from_iter_values(instants)),
-                }
-            }
-            _ => Arc::new(Float64Array::from_iter_values(numbers())),
-        }
-    };
+    let right = from_frame_0(read("own.csv", table().text().as_bytes()).unwrap());
+    let text = with_times(|t| format!("{}", 1_740_823_200_000_000 + (1e6 * t).round() as i64)).text();
+    let mut columns = crate::traffic::tracks::columns(&text, &["track_id", "t"]);
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("own.parquet");
+    let through = |columns, codec| {
+        crate::common::made::write(&path, columns, codec);
+        read("own.parquet", &fs::read(&path).unwrap())
+    };
     let gzip = Compression::GZIP(GzipLevel::default());
     for codec in [gzip, Compression::LZ4, Compression::LZ4_RAW, Compression::SNAPPY] {
-        let columns = table.header.iter().map(|name| (name.as_str(), column(name, false))).collect();
-        crate::common::made::write(&path, columns, codec);
-        assert!(from_frame_0(read("own.parquet", &fs::read(&path).unwrap()).unwrap()) == right, "{codec:?}");
+        assert!(from_frame_0(through(columns.clone(), codec).unwrap()) == right, "{codec:?}");
     }
-    let columns = table.header.iter().map(|name| (name.as_str(), column(name, true))).collect();
-    crate::common::made::write(&path, columns, gzip);
-    let error = read("own.parquet", &fs::read(&path).unwrap()).unwrap_err();
+    let (_, times) = columns.iter_mut().find(|(name, _)| name == "t").unwrap();
+    let instants = times.as_primitive::<Int64Type>().reinterpret_cast::<TimestampMicrosecondType>();
+    *times = std::sync::Arc::new(instants);
+    let error = through(columns, gzip).unwrap_err();
     assert!(error.help().unwrap().contains("a time to int64"), "{error:?}");
 }

@@ -488,23 +488,24 @@ fn in_format_of(preset: &Preset, recording: &Recording, stride: usize, mistake: 
     text
 }
 
+/// The columns of a table: whole numbers where they are named, numbers where the first row has one, else texts.
 #[cfg(feature = "parquet")]
-fn write_parquet(path: &Path, text: &str, vehicle: &str) {
+pub fn columns(text: &str, whole: &[&str]) -> Vec<(String, arrow_array::ArrayRef)> {
     use arrow_array::{ArrayRef, Float64Array, Int64Array, StringArray};
-    let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
-    let names = lines.next().unwrap();
-    let rows: Vec<Vec<&str>> = lines.collect();
-    let column = |at: usize, name: &str| -> ArrayRef {
-        let texts = || rows.iter().map(move |row| row[at]);
+    let table = Plain::of_text(text);
+    let column = |(at, name): (usize, &String)| -> (String, ArrayRef) {
+        let texts = || table.rows.iter().map(move |row| row[at].as_str());
         let numbers = || texts().map(|text| text.parse::<f64>().unwrap());
-        match rows[0][at].parse::<f64>() {
-            _ if name == vehicle => std::sync::Arc::new(Int64Array::from_iter_values(numbers().map(|id| id as i64))),
+        let array: ArrayRef = match table.rows[0][at].parse::<f64>() {
+            _ if whole.contains(&&**name) => {
+                std::sync::Arc::new(Int64Array::from_iter_values(numbers().map(|n| n as i64)))
+            }
             Err(_) => std::sync::Arc::new(StringArray::from_iter_values(texts())),
             Ok(_) => std::sync::Arc::new(Float64Array::from_iter_values(numbers())),
-        }
+        };
+        (name.clone(), array)
     };
-    let columns = names.iter().enumerate().map(|(at, name)| (*name, column(at, name))).collect();
-    crate::common::made::write(path, columns, parquet::basic::Compression::SNAPPY);
+    table.header.iter().enumerate().map(column).collect()
 }
 
 /// Every preset reads traffic in its own format, and finds the usual mistakes in it.
@@ -537,7 +538,10 @@ fn every_preset_reads_its_own_format_and_finds_mistakes_in_it() {
             let text = in_format_of(&preset, &recording, stride, mistake);
             match is_parquet {
                 #[cfg(feature = "parquet")]
-                true => write_parquet(&path, &text, &preset.columns[&Role::Vehicle].names()[0]),
+                true => {
+                    let columns = columns(&text, &[preset.columns[&Role::Vehicle].names()[0].as_str()]);
+                    crate::common::made::write(&path, columns, parquet::basic::Compression::SNAPPY);
+                }
                 _ => std::fs::write(&path, text).unwrap(),
             }
             let file = TrackFile { path: path.clone(), id: "own".to_owned() };
