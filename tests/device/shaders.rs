@@ -410,15 +410,6 @@ fn the_host_reads_from_an_outcome_word_what_a_lane_writes_into_it() {
     assert_eq!(read(1 << 6 | settled).unwrap().contact_with, 1);
 }
 
-#[test]
-fn a_variable_in_a_loop_that_begins_with_nothing_is_found() {
-    let body = |declared: &str| {
-        format!("fn f() {{\n  for (var k = 0u; k < 9u; k++) {{\n    {declared}\n  }}\n  var y: u32;\n}}")
-    };
-    assert_eq!(uninitialized_in_loops(&body("var x: u32;")), ["var x: u32;"]);
-    assert!(uninitialized_in_loops(&body("var x: u32 = 0u;")).is_empty());
-}
-
 /// Functions of the Rust file beside a shader, but for those without a twin.
 fn twin_functions(folder: &str, shader: &str, no_twin: &[&str]) -> Vec<String> {
     let text = text_of(&format!("{folder}/{}", shader.replace(".wgsl", ".rs")));
@@ -505,7 +496,10 @@ fn only_the_entry_has_bindings_and_every_file_stays_short_and_plain() {
 }
 
 #[test]
-fn a_loop_that_counts_up_to_no_constant_is_found() {
+fn a_loop_that_counts_up_to_no_constant_and_a_variable_in_one_that_begins_with_nothing_are_found() {
+    let body = |declared: &str| format!("fn f() {{\n  loop {{\n    {declared}\n  }}\n  var y: u32;\n}}");
+    assert_eq!(uninitialized_in_loops(&body("var x: u32;")), ["var x: u32;"]);
+    assert!(uninitialized_in_loops(&body("var x: u32 = 0u;")).is_empty());
     for (body, counted) in [
         ("for (var k = 0u; k < 9u; k++) { x = x + 1.0; }", true),
         ("for (var k = 0u; k < n; k++) { x = x + 1.0; }", false),

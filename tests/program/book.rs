@@ -146,17 +146,13 @@ fn the_table_of_contents_holds_every_chapter_once() {
 }
 
 #[test]
-fn every_verb_is_in_the_book() {
+fn every_verb_is_in_the_book_and_every_printed_command_has_a_verb_and_flags_that_exist() {
     let book: String = chapters().into_iter().map(|chapter| chapter.text).collect();
-    for verb in verbs() {
-        assert!(book.contains(&format!("lanesweep {verb}")), "no chapter has `lanesweep {verb}`");
-    }
-}
-
-#[test]
-fn every_printed_command_has_a_verb_and_flags_that_exist() {
     let helps: BTreeMap<String, String> =
         verbs().into_iter().map(|verb| (verb.clone(), ran(root(), &format!("{verb} --help")))).collect();
+    for verb in helps.keys() {
+        assert!(book.contains(&format!("lanesweep {verb}")), "no chapter has `lanesweep {verb}`");
+    }
     let (mut wrong, mut checked) = (Vec::new(), 0);
     for document in documents() {
         // What a changelog says of an earlier version need not be true of this one.

@@ -66,7 +66,7 @@ fn the_author_s_estimates_are_reproduced() {
 }
 
 #[test]
-fn sums_of_a_proposal_are_the_same_bits_in_any_division_of_the_indices() {
+fn sums_of_a_proposal_are_the_same_bits_in_any_division_of_the_indices_and_a_search_with_one_thread() {
     let density = StandardNormal { dimensions: 2 };
     let proposal = Mixture::of_kernels(vec![vec![2.0, 2.0]], &[0.7, 0.7]).unwrap();
     let options = Importance { seed: 9, draws: 20_000, crude_per_draw: 3 };
@@ -77,6 +77,8 @@ fn sums_of_a_proposal_are_the_same_bits_in_any_division_of_the_indices() {
     parts.merge(of(123..7001)).unwrap();
     assert_eq!(parts, whole);
     assert_eq!(with_threads(1, || of(0..20_000)), whole);
+    let search = || found(&StandardNormal { dimensions: 4 }, &linear(4.0), 8);
+    assert_eq!(with_threads(1, search), search());
 }
 
 /// Of the first question, within a fraction of the truth.
@@ -165,12 +167,6 @@ fn one_search_answers_several_questions_with_the_same_draws() {
         assert_eq!(estimate.trust.draws() == Verdict::Sound, beta < 4.5, "{beta}: {estimate:?}");
         assert_eq!(estimate.runs, estimates[0].runs);
     }
-}
-
-#[test]
-fn a_search_has_the_same_bits_with_one_thread() {
-    let of = || found(&StandardNormal { dimensions: 4 }, &linear(4.0), 8);
-    assert_eq!(with_threads(1, of), of());
 }
 
 #[test]

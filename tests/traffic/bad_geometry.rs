@@ -34,14 +34,9 @@ fn changed(texts: &Texts, column: &str, change: impl Fn(f64, f64) -> f64) -> Tex
 }
 
 #[test]
-fn good_geometry_says_nothing() {
+fn a_mirrored_axis_and_a_wrong_reference_point_are_refused_and_good_geometry_says_nothing() {
     let texts = Texts::of(&traffic());
     assert_eq!(texts.read_checked(Implausible::Refused).unwrap().notes, [""; 0]);
-}
-
-#[test]
-fn a_mirrored_axis_and_a_wrong_reference_point_are_refused() {
-    let texts = Texts::of(&traffic());
     let y_with = |part: f64| changed(&texts, "y", |y, height| y + part * height);
     let cases: [(&str, Texts, &[&str]); 7] = [
         ("upside down", changed(&texts, "y", |y, _| -y), &["mirrored"]),

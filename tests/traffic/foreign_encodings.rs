@@ -117,9 +117,10 @@ fn compressed_highd_files_are_read() {
 }
 
 #[test]
-fn times_in_any_notation_are_the_same_times() {
+fn times_in_any_notation_are_the_same_times_what_they_are_taken_for_is_said_and_midnight_is_refused() {
     let right = from_frame_0(read("own.csv", table().text().as_bytes()).unwrap());
-    let clock = |t: f64| format!("{:02}:{:02}:{:05.2}", 8 + (t / 3600.0) as u32, (t / 60.0) as u32 % 60, t % 60.0);
+    let of_day = |t: f64| format!("{:02}:{:02}:{:05.2}", (t / 3600.0) as u32, (t / 60.0) as u32 % 60, t % 60.0);
+    let clock = |t: f64| of_day(t + 8.0 * 3600.0);
     let notations: [(&str, &dyn Fn(f64) -> String); 6] = [
         ("milliseconds", &|t| format!("{:.0}", 1_740_823_200_000.0 + 1000.0 * t)),
         ("microseconds", &|t| format!("{:.0}", 1_740_823_200_000_000.0 + 1e6 * t)),
@@ -133,20 +134,10 @@ fn times_in_any_notation_are_the_same_times() {
         assert_eq!(found.frame_rate_hz, right.frame_rate_hz, "{name}");
         assert!(found == right, "{name}");
     }
-}
-
-#[test]
-fn what_a_time_without_a_unit_is_taken_for_is_said() {
-    let about = understood(&with_times(|t| format!("{:.0}", 1_740_823_200_000.0 + 1000.0 * t))).unwrap();
+    let about = understood(&with_times(notations[0].1)).unwrap();
     assert!(fact(&about, "columns").contains("time = t (ms since 1970)"), "{:?}", about.facts);
-}
-
-#[test]
-fn times_of_day_that_pass_midnight_are_refused() {
-    let evening = |t: f64| {
-        let of_day = (t + 86_390.0) % 86_400.0;
-        format!("{:02}:{:02}:{:05.2}", (of_day / 3600.0) as u32, (of_day / 60.0) as u32 % 60, of_day % 60.0)
-    };
+    // Times of day that pass midnight.
+    let evening = |t: f64| of_day((t + 86_390.0) % 86_400.0);
     let error = read("own.csv", with_times(evening).text().as_bytes()).unwrap_err().to_string();
     assert!(error.contains("midnight") && error.contains("line "), "{error}");
 }

@@ -96,8 +96,13 @@ fn rows_by_vehicle(table: &Plain) -> BTreeMap<u32, Vec<usize>> {
     rows
 }
 
+/// Simulators change lanes in one step.
 #[test]
-fn a_step_that_no_vehicle_makes_gives_two_tracks_and_is_said() {
+fn a_step_that_no_vehicle_makes_gives_two_tracks_and_is_said_but_a_lane_change_in_one_step_does_not() {
+    let mut table = with_speeds();
+    let rows = rows_by_vehicle(&table);
+    table.shift(&rows.values().find(|rows| rows.len() > 60).unwrap()[30..], "y", 3.5);
+    assert!(!says(&understood(&table).unwrap(), "no vehicle makes"));
     for by_m in [8.0, -60.0] {
         let mut table = with_speeds();
         let tracks = read(&table).unwrap().loaded.recording.tracks.len();
@@ -177,15 +182,6 @@ fn numbers_that_fit_one_another_badly_are_told() {
     let good = understood(&with_accelerations(1.0, 0.0)).unwrap();
     assert!(fact(&good, "distance").starts_with("1.000 times"), "{:?}", good.facts);
     assert!(fact(&good, "peaks").starts_with("accelerations are 0.99 times"), "{:?}", good.facts);
-}
-
-/// Simulators change lanes in one step.
-#[test]
-fn a_lane_change_in_one_step_does_not_split_a_track() {
-    let mut table = with_speeds();
-    let rows = rows_by_vehicle(&table);
-    table.shift(&rows.values().find(|rows| rows.len() > 60).unwrap()[30..], "y", 3.5);
-    assert!(!says(&understood(&table).unwrap(), "no vehicle makes"));
 }
 
 /// In five seconds, or of eight vehicles, where they keep in their lanes and how their headings turn says little.

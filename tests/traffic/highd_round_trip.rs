@@ -206,6 +206,17 @@ fn announced_vehicles_without_frames_are_left_out_and_strange_ones_are_noted() {
     assert!(notes.iter().all(|note| note.contains("vehicle 5")), "{notes:?}");
 }
 
+/// Except inside the very last number: nothing tells 12 from 1 there.
+#[test]
+fn wherever_the_last_line_is_cut_the_file_is_called_truncated() {
+    let texts = small::Texts::small();
+    for cut in 3..=texts.tracks.lines().last().unwrap().len() {
+        let tracks = texts.tracks[..texts.tracks.len() - cut].to_owned();
+        let error = small::Texts { tracks, ..texts.clone() }.read().unwrap_err();
+        assert!(format!("{error} {:?}", error.help()).contains("trunc"), "{cut}: {error}");
+    }
+}
+
 #[test]
 fn a_recording_that_the_format_cannot_hold_is_refused_and_nothing_is_written() {
     type Spoil<'a> = &'a dyn Fn(&mut Recording);

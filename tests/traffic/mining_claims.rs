@@ -112,7 +112,7 @@ fn cut_out_before(lead: Car) -> [Car; 3] {
 }
 
 #[test]
-fn a_slower_vehicle_that_cuts_in_closely_is_found_and_kept() {
+fn a_slower_vehicle_that_cuts_in_closely_is_found_and_kept_from_either_side() {
     let s = only(&cut_in_from(LEFT), Category::CutIn);
     assert!(s.kept, "{}", s.reason);
     assert_eq!((s.side, s.truncated_start, s.end_cause.as_deref()), (Side::Left, Some(false), Some("lc_end")));
@@ -125,13 +125,10 @@ fn a_slower_vehicle_that_cuts_in_closely_is_found_and_kept() {
     assert_eq!(s.target.v.len() as i64, s.frame1 - s.frame0 + 1);
     let gap = 45.0 - 3.0 * start_s - LENGTH_M;
     assert!((s.gap0.unwrap() - gap).abs() < 0.011 && (s.thw0.unwrap() - s.gap0.unwrap() / 30.0).abs() < 1e-12);
-}
-
-#[test]
-fn a_cut_in_from_the_other_side_is_its_mirror_image() {
-    let (left, right) = (only(&cut_in_from(LEFT), Category::CutIn), only(&cut_in_from(RIGHT), Category::CutIn));
+    // From the other side it is its mirror image.
+    let right = only(&cut_in_from(RIGHT), Category::CutIn);
     assert_eq!(right.side, Side::Right);
-    assert_eq!(Scenario { side: Side::Left, ..right }, left);
+    assert_eq!(Scenario { side: Side::Left, ..right }, s);
 }
 
 #[test]

@@ -111,6 +111,10 @@ fn faults_of_a_recording_are_told() {
         let is_told = says(&about, &format!("{way}: vehicles move 0.909 times"));
         assert!(is_told || !about.is_usable(), "{way}: {:?}", about.findings);
     }
+    // Good recordings are told none of it.
+    for about in [highd_understood(&generated()), understood(&Plain::of(&generated(), 5)).unwrap()] {
+        assert!(WORDS.iter().all(|words| !says(&about, words)), "{:?}", about.findings);
+    }
 }
 
 /// Positions in whole metres, and a road in Web Mercator at 51 degrees: without speeds nothing else tells the scale.
@@ -126,15 +130,6 @@ fn coarse_positions_and_stretched_roads_are_told() {
     ["x", "y"].iter().for_each(|axis| table.map(axis, |m, _| 1.589 * m));
     let about = understood(&table).unwrap();
     assert!(says(&about, "m wide (median; 2.7 to 4.6 is usual)"), "{:?}", about.findings);
-}
-
-#[test]
-fn good_recordings_are_told_none_of_it() {
-    let recording = generated();
-    let all = [highd_understood(&recording), understood(&Plain::of(&recording, 5)).unwrap()];
-    for about in all {
-        assert!(WORDS.iter().all(|words| !says(&about, words)), "{:?}", about.findings);
-    }
 }
 
 #[test]
