@@ -12,22 +12,23 @@ use lanesweep::scenario::{Case, Tables};
 /// Every form of every option that decides how a lane runs, and other time steps and caps.
 pub fn forms() -> Vec<Profile> {
     let paper = Profile::load("paper").unwrap();
+    let of = |base: &Profile, change: &dyn Fn(&mut Profile)| {
+        let mut profile = base.clone();
+        change(&mut profile);
+        profile
+    };
+    let with = |change: &dyn Fn(&mut Profile)| of(&paper, change);
     let mut profiles = vec![paper.clone().with_dt(0.1).unwrap(), paper.clone().with_dt(0.01).unwrap()];
     for btn in [BtnForm::EquivalentDelay, BtnForm::Exact, BtnForm::DistanceRatio] {
         for gate in [LateralGate::EgoWidth, LateralGate::Overlap] {
             for (btn_contact, aborts) in [(BtnContact::Any, false), (BtnContact::Gated, true)] {
-                let mut profile = paper.clone();
-                (profile.criteria.btn, profile.criteria.gate, profile.criteria.btn_contact) = (btn, gate, btn_contact);
-                profile.cchdm.abort_on_large_ttc = aborts;
-                profiles.push(profile);
+                profiles.push(with(&|of| {
+                    (of.criteria.btn, of.criteria.gate, of.criteria.btn_contact) = (btn, gate, btn_contact);
+                    of.cchdm.abort_on_large_ttc = aborts;
+                }));
             }
         }
     }
-    let with = |change: &dyn Fn(&mut Profile)| {
-        let mut profile = paper.clone();
-        change(&mut profile);
-        profile
-    };
     profiles.push(with(&|of| of.frame.cut_out_evaluated = CutOutEvaluated::Ahead));
     profiles.push(with(&|of| of.frame.cut_out_target = CutOutTarget::Exposed));
     profiles.push(with(&|of| of.frame.cut_out_target = CutOutTarget::LargestDemand));
@@ -38,17 +39,14 @@ pub fn forms() -> Vec<Profile> {
     }));
     profiles.push(with(&|of| of.frame.time_cap_s = 2.0 * of.frame.dt_s));
     // Steps in which vehicles drive past one another, up to the longest: with every gate and rule of its own.
-    let mut patient = paper.clone();
-    (patient.reg157.reaction_time_s, patient.reg157.margin_s, patient.cchdm.delay_s) = (1.2, 0.5, 1.8);
-    (patient.rss.response_time_s, patient.fsm.reaction_time_s) = (1.5, 1.2);
-    let mut overlap = patient.clone();
-    overlap.criteria.gate = LateralGate::Overlap;
-    let mut aborting = patient.clone();
-    aborting.cchdm.abort_on_large_ttc = true;
-    let mut shifted = overlap.clone();
-    shifted.frame.start_shift = true;
-    let mut exposed = shifted.clone();
-    exposed.frame.cut_out_target = CutOutTarget::Exposed;
+    let patient = with(&|of| {
+        (of.reg157.reaction_time_s, of.reg157.margin_s, of.cchdm.delay_s) = (1.2, 0.5, 1.8);
+        (of.rss.response_time_s, of.fsm.reaction_time_s) = (1.5, 1.2);
+    });
+    let overlap = of(&patient, &|of| of.criteria.gate = LateralGate::Overlap);
+    let aborting = of(&patient, &|of| of.cchdm.abort_on_large_ttc = true);
+    let shifted = of(&overlap, &|of| of.frame.start_shift = true);
+    let exposed = of(&shifted, &|of| of.frame.cut_out_target = CutOutTarget::Exposed);
     profiles.extend(
         [(&patient, 0.2), (&patient, 0.35), (&overlap, 0.35), (&aborting, 0.35), (&shifted, 0.35), (&exposed, 0.3)]
             .map(|(profile, dt_s)| profile.clone().with_dt(dt_s).unwrap()),

@@ -54,7 +54,9 @@ pub fn start(dir: &Path, args: &[&str]) -> Child {
     command(dir, args).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
-pub fn ended(child: Child) -> (i32, String) {
+/// Exit code and stderr of a run that ends within the patience of the tests.
+pub fn ended(mut child: Child) -> (i32, String) {
+    wait_until("the process ends", || child.try_wait().unwrap().is_some());
     let (code, _, err) = read(child.wait_with_output().unwrap());
     (code, err)
 }

@@ -7,8 +7,7 @@ use crate::common::program::{files, ran, same, without_host};
 /// Every run that can be split, in one piece and in so many shards, of which every other one is the device's.
 fn whole_and_shards(counts: &[u64]) {
     let Some((_, device)) = software_device() else { return };
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
+    let dir = &*crate::common::folder();
     write_cut_in_density(&dir.join("density.json"));
     let sample = "sample density.json --samples 9000 --thw 0.4 --models FSM,RSS";
     ran(dir, &format!("-q {sample} --estimator is --backend cpu --out pilot"));

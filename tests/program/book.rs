@@ -16,7 +16,7 @@ use std::process::Command;
 
 use rayon::prelude::*;
 
-use crate::common::program::ran;
+use crate::common::program::{names, ran};
 use crate::program::command_line::verbs;
 use crate::program::console;
 use markdown::{Document, Link};
@@ -28,20 +28,8 @@ fn root() -> &'static Path {
 
 /// Markdown files below a folder of the crate, by their path from its root, in order.
 fn markdown_below(folder: &str) -> Vec<String> {
-    fn add(found: &mut Vec<String>, at: &str) {
-        let entries = fs::read_dir(root().join(at)).unwrap_or_else(|e| panic!("{at}: {e}"));
-        for entry in entries {
-            let entry = entry.unwrap();
-            let name = format!("{at}/{}", entry.file_name().into_string().unwrap());
-            if entry.file_type().unwrap().is_dir() {
-                add(found, &name);
-            } else if name.ends_with(".md") {
-                found.push(name);
-            }
-        }
-    }
-    let mut found = Vec::new();
-    add(&mut found, folder);
+    let all = names(&root().join(folder)).into_iter().map(|name| format!("{folder}/{name}"));
+    let mut found: Vec<String> = all.filter(|name| name.ends_with(".md")).collect();
     found.sort();
     found
 }
@@ -204,8 +192,8 @@ fn figures_are_what_their_commands_draw() {
     let mut listed: Vec<&str> = FIGURES.iter().map(|(figure, ..)| *figure).collect();
     listed.sort_unstable();
     let folder = root().join("docs/src/figures");
-    let names = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
-    let mut present: Vec<String> = names.filter(|name| name.ends_with(".svg") && name != OF_ROWS).collect();
+    let mut present: Vec<String> =
+        names(&folder).into_iter().filter(|name| name.ends_with(".svg") && name != OF_ROWS).collect();
     present.sort_unstable();
     assert_eq!(present, listed, "every figure has its command");
     for (figure, command, drawn) in FIGURES {

@@ -47,8 +47,7 @@ fn the_sheet_and_the_series_have_one_time_of_braking() {
 
 #[test]
 fn the_numbers_of_a_row_are_those_of_simulate_and_of_its_sheet() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
+    let dir = &*crate::common::folder();
     let rows =
         "id,category,ego_speed_kmh,speed_kmh,gap,lateral_speed\nslow,cut-in,108,36,20,2\nmild,cut-in,108,72,36,1\n";
     std::fs::write(dir.join("cases.csv"), rows).unwrap();

@@ -73,8 +73,7 @@ fn tracks() -> String {
 #[test]
 #[ignore = "half a minute and more: .ci/run long-tests"]
 fn every_example_of_the_help_runs() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
+    let dir = &*crate::common::folder();
     std::fs::write(dir.join("fewer.toml"), "[generator]\nrecordings = 12\n").unwrap();
     let mut ran = BTreeSet::new();
     for verb in verbs() {

@@ -118,8 +118,7 @@ fn little_data_makes_a_readable_page_too() {
 
 #[test]
 fn sampling_runs_maps_and_comparisons_have_their_page() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
+    let dir = &*crate::common::folder();
     write_cut_in_density(&dir.join("d.json"));
     let sample = "sample d.json --backend cpu --samples 3000";
     quietly(dir, &format!("{sample} --thw 1,0.6,0.2 --out mc"));

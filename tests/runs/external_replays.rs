@@ -49,8 +49,7 @@ fn exchange(row: &mut Value) {
 
 #[test]
 fn what_is_strange_about_s_prime_is_said_and_what_cannot_be_one_is_refused() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
+    let dir = &*crate::common::folder();
     let all = mined(dir);
     let [cut_ins, cut_outs] =
         ["cut_in", "cut_out"].map(|of| all.iter().filter(|row| row["category"] == of).cloned().collect::<Vec<_>>());

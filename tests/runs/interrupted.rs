@@ -2,27 +2,19 @@
 #![cfg(unix)]
 
 use std::path::Path;
-use std::process::Child;
 use std::time::{Duration, Instant};
 
 use crate::common::lane_sets::random;
-use crate::common::program::{self, names, send, start, wait_for_run, wait_until, words};
+use crate::common::program::{ended, names, send, start, wait_for_run, wait_until, words};
 use lanesweep::prelude::*;
 
 fn unfinished(dir: &Path) -> Vec<String> {
     names(dir).into_iter().filter(|name| name.ends_with(".part")).collect()
 }
 
-/// Exit code and stderr of a run that ends within the patience of the tests.
-fn ended(mut run: Child) -> (i32, String) {
-    wait_until("the process ends", || run.try_wait().unwrap().is_some());
-    program::ended(run)
-}
-
 /// A study that is sent `signal` while it writes its lanes.
 fn study_interrupted_by(signal: &str) -> i32 {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
+    let dir = &*crate::common::folder();
     std::fs::write(dir.join("lanes.csv"), "of an earlier run").unwrap();
     let small = "--config study.reference=true --synth-recordings 2 --config generator.duration_s=300";
     let mut study = start(dir, &words(&format!("-q --threads 1 study {small} --out out --rows lanes.csv")));
@@ -61,8 +53,7 @@ fn long_scenarios(path: &Path) {
 /// The first chunk alone, a scenario, takes 15 s.
 #[test]
 fn a_signal_ends_a_run_within_five_seconds_also_in_its_first_chunk_and_a_second_one_at_once() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
+    let dir = &*crate::common::folder();
     long_scenarios(&dir.join("long.jsonl"));
     let long = "--config study.reference=true --dt 0.0001 --scenarios long.jsonl --out out";
     let signalled = |signals: &[&str]| {

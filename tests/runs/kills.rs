@@ -3,7 +3,7 @@
 #![cfg(unix)]
 
 use crate::common::mined::write_cut_in_density;
-use crate::common::program::{self, Files, ended, kill, names, same, unbroken, without_times, words};
+use crate::common::program::{self, Files, ended, kill, names, ran, same, unbroken, without_times, words};
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -24,32 +24,27 @@ struct Verb {
 
 const STUDY: &str = "study --synth-recordings 1 --config generator.duration_s=120 --config study.compare_reference=true \
                      --rows out/lanes.csv --out out";
-const SAMPLE: &str = "sample d.json --thw 0.6 --models RSS --samples 3000 --out out";
+const SAMPLE: &str = "sample d.json --thw 0.6 --models RSS --samples 3000 --backend cpu --out out";
 const FIT: &str = "fit --synth-recordings 2 --categories cut-in --parameterizations 2 --config fit.valid_draws=999 \
                    --out out";
 
 #[rustfmt::skip] // a table
 const VERBS: [Verb; 5] = [
-    Verb { name: "study", record: Some("run.json"), older: Some(STUDY), run: "study --plan plan/plan.json --threads 1 --out out" },
-    Verb { name: "study --shard", record: None, older: None, run: "study --plan plan/plan.json --shard 0/2 --threads 1 --out out" },
+    Verb { name: "study", record: Some("run.json"), older: Some(STUDY), run: "study --plan plan/plan.json --backend cpu --threads 1 --out out" },
+    Verb { name: "study --shard", record: None, older: None, run: "study --plan plan/plan.json --shard 0/2 --backend cpu --threads 1 --out out" },
     Verb { name: "merge", record: Some("run.json"), older: Some(STUDY), run: "merge out" },
     Verb { name: "sample", record: Some("estimate.json"), older: Some(SAMPLE),
-           run: "sample d.json --estimator is --samples 10000 --thw 0.6 --models RSS,FSM --out out" },
+           run: "sample d.json --estimator is --samples 10000 --thw 0.6 --models RSS,FSM --backend cpu --out out" },
     Verb { name: "fit", record: None, older: Some(FIT),
            run: "fit --synth-recordings 3 --categories cut-in --config fit.valid_draws=1000 --out out" },
 ];
 
 fn start(dir: &Path, line: &str) -> Child {
-    let mut args = [&["-q"][..], &words(line)].concat();
-    if ["study --plan", "sample"].iter().any(|verb| line.starts_with(verb)) {
-        args.extend(["--backend", "cpu"]);
-    }
-    program::start(dir, &args)
+    program::start(dir, &words(&format!("-q {line}")))
 }
 
 fn done(dir: &Path, line: &str) {
-    let (code, said) = ended(start(dir, line));
-    assert!(code == 0, "{code}, {line}: {said}");
+    ran(dir, &format!("-q {line}"));
 }
 
 /// The search that a sample keeps while it draws.
@@ -91,13 +86,12 @@ fn put(dir: &Path, from: Option<&str>) {
 /// A folder with a density, a plan and the parts of its run, which are made once.
 fn furnished() -> tempfile::TempDir {
     static MADE: LazyLock<Files> = LazyLock::new(|| {
-        let dir = tempfile::tempdir().unwrap();
-        let dir = dir.path();
+        let dir = &*crate::common::folder();
         write_cut_in_density(&dir.join("d.json"));
         done(dir, "study --synth-recordings 1 --config study.reference=true --dt 0.02 --plan-only --out plan");
         program::copy(&dir.join("plan"), &dir.join("parts"));
-        let _ =
-            ["0/2", "1/2"].map(|shard| done(dir, &format!("study --plan plan/plan.json --shard {shard} --out parts")));
+        let _ = ["0/2", "1/2"]
+            .map(|shard| done(dir, &format!("study --plan plan/plan.json --shard {shard} --backend cpu --out parts")));
         program::files(dir)
     });
     let dir = tempfile::tempdir().unwrap();
@@ -188,8 +182,7 @@ fn a_killed_run_leaves_one_runs_files_and_ends_as_if_undisturbed() {
 
 #[test]
 fn scenarios_and_what_was_driven_for_them_are_of_one_run_after_a_kill() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
+    let dir = &*crate::common::folder();
     for (data, seed) in [("a", 1), ("b", 2)] {
         let small = "--synth-recordings 1 --config generator.duration_s=60";
         done(dir, &format!("tracks --convert {data} {small} --config generator.seed={seed}"));

@@ -27,8 +27,7 @@ pub fn whole() -> &'static (PathBuf, String) {
 
 #[test]
 fn a_study_in_shards_is_the_study_in_one_piece() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
+    let dir = &*crate::common::folder();
     let (folder, whole) = whole();
     // Each makes the plan itself; in another order.
     let shard = |shard: &str| ran(dir, &format!("{STUDY} --out three --shard {shard}"));
@@ -53,8 +52,7 @@ fn a_study_in_shards_is_the_study_in_one_piece() {
 
 #[test]
 fn parts_share_a_folder_and_keep_whole_runs_merges_and_themselves_out() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
+    let dir = &*crate::common::folder();
     write_cut_in_density(&dir.join("density.json"));
     let run = "-q sample density.json --backend cpu --samples 100000000 --out run";
     let mut first = start(dir, &words(&format!("{run} --shard 0/2")));

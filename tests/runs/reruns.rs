@@ -26,8 +26,7 @@ fn left_plan(path: &Path) -> LanePlan {
 
 #[test]
 fn random_lanes_of_a_study_are_the_studys_lanes() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
+    let dir = &*crate::common::folder();
     ran(dir, "-q study --synth-recordings 12 --backend cpu --out result");
     // The study itself, as it sweeps: in batches, on the widest instructions.
     let options = StudyOptions { folds: Some(5), ..StudyOptions::default() };

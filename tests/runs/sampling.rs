@@ -99,8 +99,7 @@ fn a_run_in_parts_is_the_run_in_one_and_its_failing_lanes_are_the_first_of_all_r
 /// draws these are counted apart; nothing has a rate per hour, as the headway is imposed.
 #[test]
 fn draws_of_cut_outs_that_no_traffic_has_are_counted_apart_and_imposed_headways_have_no_rate() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
+    let dir = &*crate::common::folder();
     let mut density = density(Category::CutOut, "a");
     density.exposure = Some(Exposure::new(40, Driven { hours: Some(10.0), kilometres: Some(800.0) }));
     write_density(&dir.join("d.json"), &density).unwrap();

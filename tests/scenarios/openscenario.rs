@@ -210,8 +210,7 @@ fn a_cut_out_whose_other_vehicles_overlap_says_so_in_its_file() {
 
 #[test]
 fn lanes_of_a_study_and_of_a_sampling_run_are_those_of_simulate_in_binary32() {
-    let dir = tempfile::tempdir().unwrap();
-    let root = dir.path();
+    let root = &*crate::common::folder();
     write_scenarios(&root.join("s.jsonl"), scenarios_of(1)).unwrap();
     ran(root, "study --scenarios s.jsonl --backend cpu --out study --rows lanes.csv");
     // The first lanes that collide, by their keys.

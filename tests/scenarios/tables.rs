@@ -15,8 +15,7 @@ use made::{Read, read};
 
 #[test]
 fn a_study_gives_the_same_bytes_from_parquet_and_from_json_lines() {
-    let dir = tempfile::tempdir().unwrap();
-    let at = dir.path();
+    let at = &*crate::common::folder();
     ran(at, "-q tracks --convert rec --synth-recordings 3");
     ran(at, "-q mine rec --out s.jsonl");
     ran(at, "-q mine rec --out s.parquet");
@@ -65,8 +64,7 @@ fn a_study_gives_the_same_bytes_from_parquet_and_from_json_lines() {
 
 #[test]
 fn sampled_rows_are_the_same_in_every_format() {
-    let dir = tempfile::tempdir().unwrap();
-    let at = dir.path();
+    let at = &*crate::common::folder();
     write_density(&at.join("d.json"), &density_of(2, Category::Lvd, "i", false)).unwrap();
     for (name, threads) in [("r.csv", "2"), ("r.jsonl", "2"), ("r.parquet", "2"), ("again.parquet", "1")] {
         let sample = "-q sample d.json --samples 300 --thw 0.6,1.2 --backend cpu";

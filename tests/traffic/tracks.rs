@@ -50,23 +50,14 @@ fn load_exid(dir: &Path) -> Loaded {
     load(dir).unwrap().remove(0)
 }
 
-fn by_vehicles(scenarios: Vec<Scenario>) -> BTreeMap<(Category, u32, u32), Vec<Scenario>> {
-    let mut all: BTreeMap<(Category, u32, u32), Vec<Scenario>> = BTreeMap::new();
-    for scenario in scenarios {
-        all.entry((scenario.category, scenario.ego_id, scenario.target_id)).or_default().push(scenario);
-    }
-    all
-}
-
 /// Number of scenarios, of those that another reading has within some frames, and of those whose `kept` is equal.
 fn matched(ours: &Recording, theirs: &Recording, shift: i64, frames: i64) -> [usize; 3] {
-    let options = MiningOptions::default();
-    let (ours, theirs) = (mine(ours, &options).scenarios, by_vehicles(mine(theirs, &options).scenarios));
+    let [ours, theirs] = [ours, theirs].map(|of| mine(of, &MiningOptions::default()).scenarios);
     let mut counts = [ours.len(), 0, 0];
+    let who = |of: &Scenario| (of.category, of.ego_id, of.target_id);
     for scenario in ours {
-        let near = theirs
-            .get(&(scenario.category, scenario.ego_id, scenario.target_id))
-            .and_then(|list| list.iter().find(|other| (other.frame0 + shift - scenario.frame0).abs() <= frames));
+        let is_near = |other: &Scenario| (other.frame0 + shift - scenario.frame0).abs() <= frames;
+        let near = theirs.iter().find(|other| who(other) == who(&scenario) && is_near(other));
         counts[1] += usize::from(near.is_some());
         counts[2] += usize::from(near.is_some_and(|other| other.kept == scenario.kept));
     }
@@ -189,6 +180,15 @@ fn a_plain_table_is_understood_and_nothing_is_wrong_with_it() {
     assert!(says(&about, "have no size"));
 }
 
+/// The corner of the box in place of its middle.
+fn of_corners(mut table: Plain) -> Plain {
+    for (axis, size) in [("x", "length"), ("y", "width")] {
+        let at = table.at(size);
+        table.map(axis, |v, row| v - 0.5 * row[at].parse::<f64>().unwrap());
+    }
+    table
+}
+
 #[test]
 fn wrong_units_axes_and_reference_points_are_found() {
     let table = Plain::of(&generated(), 5);
@@ -205,15 +205,7 @@ fn wrong_units_axes_and_reference_points_are_found() {
         ("y flipped, two directions", with(bare(), &|t| t.map("y", |v, _| -v)), "mirrored"),
         ("radians for degrees", with(table.clone(), &|t| t.map("heading", |v, _| v.to_radians())), "heading"),
         ("north for x", with(table.clone(), &|t| t.map("heading", |v, _| 90.0 - v)), "heading"),
-        (
-            "a corner for the centre",
-            with(bare(), &|t| {
-                let (length, width) = (t.at("length"), t.at("width"));
-                t.map("x", |v, row| v - 0.5 * row[length].parse::<f64>().unwrap());
-                t.map("y", |v, row| v - 0.5 * row[width].parse::<f64>().unwrap());
-            }),
-            "",
-        ),
+        ("a corner for the centre", of_corners(bare()), ""),
         ("a wrong time unit", with(bare(), &|t| t.map("t", |v, _| 1000.0 * v)), ""),
     ];
     for (name, table, expected) in cases {
@@ -314,18 +306,16 @@ fn columns_that_contradict_each_other_in_part_are_noted() {
 #[test]
 fn the_preset_says_what_a_wrong_file_means() {
     let table = Plain::of(&generated(), 5);
-    let [mut wrong, mut corner, mut front] = [(); 3].map(|()| table.clone());
+    let [mut wrong, mut front] = [(); 2].map(|()| table.clone());
     ["y", "vy", "heading"].iter().for_each(|column| wrong.map(column, |v, _| -v));
     assert!(!understood(&wrong).unwrap().is_usable());
-    let [length, width, heading] = ["length", "width", "heading"].map(|name| table.at(name));
+    let [length, heading] = ["length", "heading"].map(|name| table.at(name));
     let number = |row: &[String], at: usize| row[at].parse::<f64>().unwrap();
-    corner.map("x", |v, row| v - 0.5 * number(row, length));
-    corner.map("y", |v, row| v - 0.5 * number(row, width));
     front.map("x", |v, row| v + 0.5 * libm::cos(number(row, heading).to_radians()) * number(row, length));
     type Change = fn(&mut Preset);
     let says: [(Plain, Change); 3] = [
         (wrong, |preset| preset.axes.y = Side::Right),
-        (corner, |preset| preset.reference = Reference::Corner),
+        (of_corners(table), |preset| preset.reference = Reference::Corner),
         (front, |preset| preset.reference = Reference::Front),
     ];
     for (table, change) in says {
