@@ -42,11 +42,13 @@ pub fn done(dir: &Path, args: &[&str]) -> String {
     out
 }
 
-/// The same under limits that a shell sets, such as `ulimit -v 400000`.
+/// The same under limits that a shell sets, such as `ulimit -v 400000`. The environment counts as stack before the program
+/// begins, and cargo's is large.
 pub fn limited(dir: &Path, limits: &str, args: &[&str]) -> (i32, String, String) {
     let script = format!("{limits} && exec \"$0\" \"$@\"");
     let mut shell = Command::new("sh");
-    read(shell.current_dir(dir).env("NO_COLOR", "1").args(["-c", &script, PROGRAM]).args(args).output().unwrap())
+    shell.env_clear().env("PATH", std::env::var_os("PATH").unwrap_or_default()).env("NO_COLOR", "1");
+    read(shell.current_dir(dir).args(["-c", &script, PROGRAM]).args(args).output().unwrap())
 }
 
 /// Starts the program in a folder; what it says is read at its end.

@@ -366,7 +366,7 @@ fn cases_13_and_14_a_gap_typed_to_the_centimetre_is_the_annex_headway_of_2_s() {
 /// EU 2022/1426, Annex III part 1, 1.4.2: the twelve values that the KBA publishes, TTC at lane intrusion, s, for relative
 /// speeds of 10 to 60 km/h.
 #[test]
-fn case_15_the_demand_of_eu_2022_1426_begins_at_the_published_times() {
+fn cases_15_and_16_the_demand_of_eu_2022_1426_begins_at_the_published_times_before_that_of_r157() {
     for (name, published_s) in [
         ("eu-2022-1426", [0.48, 0.71, 0.94, 1.18, 1.41, 1.64]),
         ("eu-2022-1426-standing", [0.74, 1.32, 1.90, 2.47, 3.05, 3.63]),
@@ -390,12 +390,8 @@ fn case_15_the_demand_of_eu_2022_1426_begins_at_the_published_times() {
             assert!(!above.readings.iter().any(|reading| reading.quantity.starts_with("(b)")));
         }
     }
-}
-
-/// 50 behind 20 km/h: at lane intrusion 0.95 s, between the thresholds of the EU's regulation (8.333/12 + 0.25 = 0.944 s)
-/// and of R157 (1.044 s).
-#[test]
-fn case_16_the_eu_demands_what_r157_does_not() {
+    // Case 16, 50 behind 20 km/h: at lane intrusion 0.95 s, between the thresholds of the EU's regulation
+    // (8.333/12 + 0.25 = 0.944 s) and of R157 (1.044 s).
     let closing = 30.0 * KMH;
     let cut_in = case(Category::CutIn, 50.0 * KMH, 20.0 * KMH);
     let gap = Headway::GapM((1.1 + 1.0) * closing);

@@ -2,17 +2,16 @@
 
 use std::collections::BTreeSet;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
-use crate::common::program::PROGRAM;
+use crate::common::program::{command, words};
 use crate::common::{in_crate, skipped};
 use crate::program::command_line::verbs_of;
 
 fn run(dir: &Path, line: &str) -> Output {
-    let mut command = Command::new(PROGRAM);
     // Help in one line per example.
-    command.current_dir(dir).env("COLUMNS", "1000").env("LANESWEEP_CONFIG", "fewer.toml");
-    command.args(line.split_whitespace().skip(1)).output().unwrap()
+    let envs = [("COLUMNS", "1000"), ("LANESWEEP_CONFIG", "fewer.toml")];
+    command(dir, &words(line)[1..]).envs(envs).output().unwrap()
 }
 
 fn message_of(output: &Output) -> String {

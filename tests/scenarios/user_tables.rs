@@ -142,7 +142,7 @@ fn through(columns: Vec<(&str, ArrayRef)>, compression: Compression) -> laneswee
 }
 
 #[test]
-fn a_table_of_series_with_the_required_columns_is_read_whatever_program_wrote_it() {
+fn a_table_of_series_is_read_whatever_program_wrote_it_or_what_is_wrong_is_told_with_row_scenario_and_column() {
     for compression in [Compression::UNCOMPRESSED, Compression::SNAPPY] {
         let read = through(required_columns(), compression).unwrap();
         let [a, b] = &read[..] else { panic!("two scenarios") };
@@ -150,10 +150,6 @@ fn a_table_of_series_with_the_required_columns_is_read_whatever_program_wrote_it
         assert_eq!((b.category, b.kept, b.lead_id), (Category::Lvd, true, Some(12)));
         assert_eq!(b.target.v, [25.0, 10.0]);
     }
-}
-
-#[test]
-fn what_is_wrong_with_a_table_of_series_is_told_with_row_scenario_and_column() {
     let with = |name: &'static str, array: ArrayRef| {
         let mut columns = required_columns();
         match columns.iter_mut().find(|(known, _)| *known == name) {

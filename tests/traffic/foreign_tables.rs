@@ -76,11 +76,7 @@ fn one_speed_that_cannot_be_is_refused_by_vehicle_and_frame() {
         let (about, says) = (understood(&table).unwrap(), format!("vehicle {vehicle} at frame {frame}: its speed is"));
         assert!(grave(&about).contains(&format!("{says} {wrong} m/s")), "{:?}", about.findings);
     }
-}
-
-/// A small error of one speed is no contradiction to the positions, but the braking that it tells is none of a vehicle.
-#[test]
-fn a_peak_of_one_sample_beyond_what_is_physical_is_refused() {
+    // A small error of one speed is no contradiction to the positions, but the braking that it tells is none of a vehicle.
     let mut recording = generated();
     recording.tracks.truncate(60);
     let mut table = Plain::of(&recording, 1).without(&["heading", "speed"]);
