@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::{Arc, LazyLock, Mutex, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use lanesweep::prelude::*;
 use lanesweep::scenario::DataProvenance;
 use lanesweep::traffic::mining::mine;
-use lanesweep::traffic::trajectory::generator::{generate, generate_one};
+use lanesweep::traffic::trajectory::generator::generate_one;
 use rayon::prelude::*;
 
 pub fn mined(recordings: usize) -> Collection {
@@ -21,9 +21,8 @@ pub fn scenarios_of(recordings: usize) -> &'static [Scenario] {
     static KNOWN: Mutex<Known> = Mutex::new((Vec::new(), BTreeMap::new()));
     let (parts, joined) = &mut *KNOWN.lock().unwrap();
     joined.entry(recordings).or_insert_with(|| {
-        let generator = GeneratorOptions { recordings, ..GeneratorOptions::default() };
-        let one = |index| mine(&generate_one(&generator, index).unwrap(), &MiningOptions::default()).scenarios;
-        let more: Vec<_> = (parts.len()..recordings).into_par_iter().map(one).collect();
+        let scenarios = |of: &&Recording| mine(of, &MiningOptions::default()).scenarios;
+        let more: Vec<_> = self::recordings(recordings).par_iter().skip(parts.len()).map(scenarios).collect();
         parts.extend(more);
         parts[..recordings].concat().leak()
     })
@@ -43,10 +42,14 @@ pub fn provenance() -> DataProvenance {
 }
 
 /// The first of the default recordings, made once: each is the same whatever their number.
-pub fn recordings(count: usize) -> &'static [Recording] {
-    static MADE: LazyLock<Vec<Recording>> =
-        LazyLock::new(|| generate(&GeneratorOptions { recordings: 28, ..GeneratorOptions::default() }).unwrap());
-    &MADE[..count]
+pub fn recordings(count: usize) -> Vec<&'static Recording> {
+    static MADE: Mutex<Vec<&Recording>> = Mutex::new(Vec::new());
+    let mut made = MADE.lock().unwrap();
+    let generator = GeneratorOptions { recordings: count, ..GeneratorOptions::default() };
+    let one = |index| &*Box::leak(Box::new(generate_one(&generator, index).unwrap()));
+    let more: Vec<_> = (made.len()..count).into_par_iter().map(one).collect();
+    made.extend(more);
+    made[..count].to_vec()
 }
 
 /// The density of a parameterization over the scenarios of the first recordings, fitted once.

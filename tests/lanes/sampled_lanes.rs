@@ -163,12 +163,7 @@ fn a_device_makes_the_same_lanes_of_the_same_samples_and_draws_headways_and_give
         let given = plan_points(&density, points, &profile, &ModelId::ALL, &SampleHeadways::Sampled).unwrap();
         assert_alike(&format!("{key} given"), &given, &*device);
     }
-}
-
-#[test]
-fn a_device_refuses_the_draws_that_the_host_refuses() {
-    let Some(device) = common::device::software_backend() else { return };
-    let profile = Profile::load("paper").unwrap();
+    // It refuses the draws that the host refuses.
     for (category, key) in [(Category::CutIn, "7"), (Category::CutOut, "e"), (Category::CutOut, "g")] {
         // Left and right in one decomposition: many draws are in the wrong lane.
         let parameterization = ParameterizationOptions::default();

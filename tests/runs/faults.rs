@@ -2,7 +2,7 @@
 //! undisturbed one. What the machine does not allow (mounts, another user) is skipped loudly.
 #![cfg(unix)]
 
-use crate::common::{self, program};
+use crate::common::{self, Folder, folder, program};
 mod machine;
 mod workers;
 
@@ -20,10 +20,6 @@ fn same(found: &Path, undisturbed: &Path) {
     };
     let [found, expected] = [found, undisturbed].map(|dir| without_times(files(dir)).into_iter().map(page).collect());
     program::same(&found, &expected, &undisturbed.display().to_string());
-}
-
-struct Bench {
-    dir: tempfile::TempDir,
 }
 
 /// What the tests share: made once, below the target folder. Scenarios, a density, and the results of runs that nothing
@@ -46,32 +42,27 @@ const STUDY: &str = "-q study --scenarios scenarios.jsonl --backend cpu --thread
 const SAMPLE: &str = "-q sample density.json --samples 1000000 --thw 0.6 --models FSM --backend cpu --threads 1";
 const RUNS: [(&str, &str); 2] = [("study", STUDY), ("sample", SAMPLE)];
 
-impl Bench {
-    fn new() -> Bench {
-        let dir = tempfile::tempdir().unwrap();
-        for name in ["scenarios.jsonl", "density.json"] {
-            std::fs::copy(shared().join(name), dir.path().join(name)).unwrap();
-        }
-        Bench { dir }
+/// A folder with the scenarios and the density.
+fn bench() -> Folder {
+    let dir = folder();
+    for name in ["scenarios.jsonl", "density.json"] {
+        std::fs::copy(shared().join(name), dir.join(name)).unwrap();
     }
+    dir
+}
 
-    fn path(&self) -> &Path {
-        self.dir.path()
-    }
-
-    /// The same command, undisturbed, ends with the result of the undisturbed run.
-    fn ends_well(&self, name: &str, run: &str) {
-        ran(self.path(), &format!("{run} --out {name}"));
-        same(&self.path().join(name), &shared().join(name));
-    }
+/// The same command, undisturbed, ends with the result of the undisturbed run.
+fn ends_well(dir: &Path, name: &str, run: &str) {
+    ran(dir, &format!("{run} --out {name}"));
+    same(&dir.join(name), &shared().join(name));
 }
 
 #[test]
 fn an_interrupted_run_continues_and_ends_as_if_undisturbed() {
-    let bench = Bench::new();
+    let bench = bench();
     let part = format!("{SAMPLE} --out parts --shard 0/1 --config run.stop_after_s=0.3");
     for interruptions in 0.. {
-        let (code, said) = said(bench.path(), &part);
+        let (code, said) = said(&bench, &part);
         assert!(interruptions < 200, "every run must come further: {said}");
         if code == 0 {
             assert!(interruptions > 0, "the run is too short to be interrupted");
@@ -79,30 +70,30 @@ fn an_interrupted_run_continues_and_ends_as_if_undisturbed() {
         }
         assert!(code == 75 && said.contains("are done and kept") && said.contains("it continues"), "{code}: {said}");
     }
-    ran(bench.path(), "-q merge parts");
-    super::parts::same(&shared().join("sample"), &bench.path().join("parts"));
+    ran(&bench, "-q merge parts");
+    super::parts::same(&shared().join("sample"), &bench.join("parts"));
 }
 
 #[test]
 fn at_a_limit_of_the_size_of_files_the_run_says_so_and_ends_well_without_it() {
-    let bench = Bench::new();
+    let bench = bench();
     // In blocks of 512 or 1024 bytes, as the shell counts: less than a table of the study, than a sample's journal.
     for ((name, run), blocks) in RUNS.into_iter().zip([1, 8]) {
         let line = format!("{run} --out {name}");
-        let (code, _, err) = limited(bench.path(), &format!("ulimit -f {blocks}"), &words(&line));
+        let (code, _, err) = limited(&bench, &format!("ulimit -f {blocks}"), &words(&line));
         let said = unbroken(err.as_bytes());
         assert!(code == 6 && said.contains("File too large") && said.contains("ulimit -f"), "{code}: {said}");
-        bench.ends_well(name, run);
+        ends_well(&bench, name, run);
     }
 }
 
 #[test]
 fn a_folder_that_vanishes_in_mid_run_is_told_or_made_again_and_nothing_is_claimed_that_is_lost() {
-    let bench = Bench::new();
-    let out = bench.path().join("sample");
+    let bench = bench();
+    let out = bench.join("sample");
     for round in 0..2 {
         let long = format!("{SAMPLE} --config run.stop_after_s=100000 --out sample");
-        let mut run = start(bench.path(), &words(&long));
+        let mut run = start(&bench, &words(&long));
         // Before its journal is begun, and after.
         let awaited = |entry: &String| if round == 0 { entry == "run.lock" } else { entry.ends_with(".journal") };
         wait_for_run(&mut run, "something is being written", || names(&out).iter().any(awaited));
@@ -116,7 +107,7 @@ fn a_folder_that_vanishes_in_mid_run_is_told_or_made_again_and_nothing_is_claime
             assert!(where_it_was.iter().any(|place| said.contains(place)), "{said}");
             assert!(!said.contains("are done and kept"), "{said}");
             assert!(!out.exists(), "a folder that is taken away is not made again by a journal");
-            ran(bench.path(), &format!("{SAMPLE} --out sample"));
+            ran(&bench, &format!("{SAMPLE} --out sample"));
         }
         same(&out, &shared().join("sample"));
         std::fs::remove_dir_all(&out).unwrap();

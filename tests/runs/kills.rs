@@ -4,6 +4,7 @@
 
 use crate::common::mined::write_cut_in_density;
 use crate::common::program::{self, Files, ended, kill, names, ran, same, unbroken, without_times, words};
+use crate::common::{Folder, folder};
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -84,7 +85,7 @@ fn put(dir: &Path, from: Option<&str>) {
 }
 
 /// A folder with a density, a plan and the parts of its run, which are made once.
-fn furnished() -> tempfile::TempDir {
+fn furnished() -> Folder {
     static MADE: LazyLock<Files> = LazyLock::new(|| {
         let dir = &*crate::common::folder();
         write_cut_in_density(&dir.join("d.json"));
@@ -94,8 +95,8 @@ fn furnished() -> tempfile::TempDir {
             .map(|shard| done(dir, &format!("study --plan plan/plan.json --shard {shard} --backend cpu --out parts")));
         program::files(dir)
     });
-    let dir = tempfile::tempdir().unwrap();
-    program::put(&MADE, dir.path());
+    let dir = folder();
+    program::put(&MADE, &dir);
     dir
 }
 
@@ -121,8 +122,7 @@ fn assert_tidy(dir: &Path, what: &str) {
 #[test]
 fn a_killed_run_leaves_one_runs_files_and_ends_as_if_undisturbed() {
     let kills: usize = std::env::var("LANESWEEP_KILLS").map_or(VERBS.len(), |text| text.parse().unwrap());
-    let dir = furnished();
-    let dir = dir.path();
+    let dir = &*furnished();
     let mut undisturbed: BTreeMap<(usize, bool), (Duration, Files)> = BTreeMap::new();
     let (mut alive, mut continued, mut switching, mut recorded) = (0, 0, 0, 0);
     for at_kill in 0..kills {
@@ -214,8 +214,7 @@ fn scenarios_and_what_was_driven_for_them_are_of_one_run_after_a_kill() {
 #[test]
 fn of_two_processes_on_one_folder_each_ends_as_if_alone_or_is_refused() {
     let every = if std::env::var_os("LANESWEEP_KILLS").is_some() { 1 } else { 3 };
-    let dir = furnished();
-    let dir = dir.path();
+    let dir = &*furnished();
     let alone = VERBS.map(|verb| {
         put(dir, Some("parts"));
         done(dir, verb.run);

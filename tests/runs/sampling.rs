@@ -2,7 +2,7 @@
 
 use crate::common::mined::{density_of, write_cut_in_density};
 use crate::common::program::{json, ran, refused, table};
-use crate::common::{self, program};
+use crate::common::{self, Folder, folder, program};
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -19,9 +19,9 @@ fn density(category: Category, key: &str) -> DensityModel {
     density_of(24, category, key, false)
 }
 
-fn folder() -> tempfile::TempDir {
-    let dir = tempfile::tempdir().unwrap();
-    write_cut_in_density(&dir.path().join("density.json"));
+fn furnished() -> Folder {
+    let dir = folder();
+    write_cut_in_density(&dir.join("density.json"));
     dir
 }
 
@@ -50,8 +50,7 @@ fn first_failing(table: &str, limit: usize) -> String {
 
 #[test]
 fn a_run_in_parts_is_the_run_in_one_and_its_failing_lanes_are_the_first_of_all_rows() {
-    let dir = folder();
-    let dir = dir.path();
+    let dir = &*furnished();
     let base = "-q sample density.json --samples 20000 --thw 0.6,0.3 --seed 9 --backend cpu";
     let whole = ran(dir, &format!("{base} --out whole --rows rows.csv --failures first.csv"));
     let _ = ["1/2", "0/2"].map(|shard| ran(dir, &format!("{base} --out joined --shard {shard}")));
@@ -140,8 +139,7 @@ fn estimates(dir: &Path, folder: &str) -> String {
 
 #[test]
 fn a_searched_proposal_can_be_sampled_again_and_in_shards_with_its_failing_draws() {
-    let dir = folder();
-    let dir = dir.path();
+    let dir = &*furnished();
     let base = "-q sample density.json --thw 0.3 --models FSM --backend cpu";
     let merged = |folder: &str| {
         ran(dir, &format!("-q merge {folder} --failures {folder}.csv"));
@@ -212,10 +210,10 @@ fn p_at_both_ends_of_the_bandwidths_interval_is_that_of_the_density_there_by_eit
     let wide = row(wide, 2.0, Estimator::Crude, 200_000);
     assert_eq!(wide.estimate.trust.usable(), "bandwidth decides", "{wide:?}");
     // Where most lanes fail, they do so at any bandwidth.
-    let dir = folder();
-    let said = ran(dir.path(), "-q sample density.json --thw 0.2 --models Reg157 --samples 3000 --backend cpu");
+    let dir = furnished();
+    let said = ran(&dir, "-q sample density.json --thw 0.2 --models Reg157 --samples 3000 --backend cpu");
     assert!(said.contains("The bandwidth decides no row"), "{said}");
-    for row in table(&dir.path().join("lanesweep-sample/estimates.csv")) {
+    for row in table(&dir.join("lanesweep-sample/estimates.csv")) {
         assert!(["probability_narrow", "probability_wide"].iter().all(|column| !row[*column].is_empty()), "{row:?}");
     }
 }
@@ -231,10 +229,10 @@ fn of_few(density: &DensityModel, scenarios: usize) -> DensityModel {
 }
 
 /// A folder with the density over nine scenarios and that over all.
-fn few_and_all() -> tempfile::TempDir {
-    let dir = tempfile::tempdir().unwrap();
-    write_density(&dir.path().join("nine.json"), &of_few(&density(Category::CutIn, "2"), 9)).unwrap();
-    write_cut_in_density(&dir.path().join("all.json"));
+fn few_and_all() -> Folder {
+    let dir = folder();
+    write_density(&dir.join("nine.json"), &of_few(&density(Category::CutIn, "2"), 9)).unwrap();
+    write_cut_in_density(&dir.join("all.json"));
     dir
 }
 
@@ -253,7 +251,7 @@ fn few_scenarios_are_said_once_and_their_interval_is_that_of_other_data_too() {
     let dir = few_and_all();
     let ends = |value: &serde_json::Value| [0, 1].map(|end| value[end].as_f64().unwrap());
     for (density, is_sound) in [("nine.json", false), ("all.json", true)] {
-        let (file, text) = estimated(dir.path(), density, "--samples 6000 --thw 1,0.4");
+        let (file, text) = estimated(&dir, density, "--samples 6000 --thw 1,0.4");
         for row in (0..3).map(|at| &file["estimates"][3 * at]) {
             assert_eq!(row["headway"], "all");
             let ([low, high], draws) = (interval(row), ends(&row["draws"]));
@@ -272,9 +270,9 @@ fn few_scenarios_are_said_once_and_their_interval_is_that_of_other_data_too() {
 #[test]
 fn draws_of_a_proposal_tell_their_scenarios_by_the_kernels_that_explain_them() {
     let dir = few_and_all();
-    let crude = estimated(dir.path(), "all.json", "--thw 0.4 --samples 6000").0["estimates"][0].clone();
+    let crude = estimated(&dir, "all.json", "--thw 0.4 --samples 6000").0["estimates"][0].clone();
     let how = "--thw 0.4 --estimator is --samples 12000";
-    let (file, text) = estimated(dir.path(), "all.json", how);
+    let (file, text) = estimated(&dir, "all.json", how);
     let rows = file["estimates"].as_array().unwrap();
     let is_costlier = rows.iter().any(|row| row["estimate"]["variance_reduction"].as_f64().is_some_and(|r| r < 1.0));
     assert_eq!(text.contains("times the lanes that crude Monte Carlo"), is_costlier, "{text}");
@@ -287,7 +285,7 @@ fn draws_of_a_proposal_tell_their_scenarios_by_the_kernels_that_explain_them() {
     let carriers =
         |row: &serde_json::Value| [0, 1, 2].map(|at| row["carriers"][at]["scenario"].as_str().unwrap().to_owned());
     assert!(carriers(&crude).contains(&carriers(&rows[0])[0]), "{crude} {}", rows[0]);
-    let few = estimated(dir.path(), "nine.json", how).0["estimates"][0].clone();
+    let few = estimated(&dir, "nine.json", how).0["estimates"][0].clone();
     assert!(few["estimate"]["trust"]["warnings"].to_string().contains("few_scenarios"), "{few}");
 }
 

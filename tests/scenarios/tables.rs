@@ -27,11 +27,7 @@ fn a_study_gives_the_same_bytes_from_parquet_and_from_json_lines() {
     }
     let bytes = |name: &str| std::fs::read(at.join(name)).unwrap();
     for name in [".csv", ".jsonl", ".parquet", "/results.csv", "/tables/claims.csv", "/tables/radar-cut-in.csv"] {
-        let (a, b) = (format!("a{name}"), format!("b{name}"));
-        if name == "/tables/radar-cut-in.csv" && !at.join(&a).exists() {
-            continue;
-        }
-        assert!(bytes(&a) == bytes(&b), "{name}");
+        assert!(bytes(&format!("a{name}")) == bytes(&format!("b{name}")), "{name}");
     }
     assert_same_rows(&at.join("a.csv"), &read(&at.join("a.parquet")));
     check_facts(&read(&at.join("a.parquet")), "lanes", true);

@@ -55,7 +55,7 @@ impl Table {
 }
 
 struct Counted {
-    recordings: &'static [Recording],
+    recordings: Vec<&'static Recording>,
     sets: f64,
     scenarios: Vec<Scenario>,
 }
@@ -66,7 +66,7 @@ impl Counted {
         &COUNTED
     }
 
-    fn of(recordings: &'static [Recording]) -> Counted {
+    fn of(recordings: Vec<&'static Recording>) -> Counted {
         let mined: Vec<Mined> = recordings.par_iter().map(|r| mine(r, &MiningOptions::default())).collect();
         let sets = mined.iter().map(|m| m.data_sets).sum::<u64>() as f64;
         Counted { recordings, sets, scenarios: mined.into_iter().flat_map(|m| m.scenarios).collect() }
@@ -98,7 +98,7 @@ impl Counted {
     }
 
     fn traffic(&self, options: &GeneratorOptions) -> Traffic {
-        measure(self.recordings, options.duration_s, options.window_m)
+        measure(&self.recordings, options.duration_s, options.window_m)
     }
 }
 
@@ -157,7 +157,7 @@ fn lane_changes_and_cut_ins_look_as_published() {
 #[test]
 fn at_rate_factor_one_scenarios_are_as_frequent_as_published() {
     let options = GeneratorOptions { event_rate_factor: 1.0, recordings: 36, ..GeneratorOptions::default() };
-    let counted = Counted::of(generate(&options).unwrap().leak());
+    let counted = Counted::of(generate(&options).unwrap().leak().iter().collect());
     let t = counted.traffic(&options);
     let mut table = Table::new("Rates at rate factor 1 (36 recordings)");
     let crossings = t.crossings as f64 / t.driven_km;

@@ -12,7 +12,7 @@ use sha2::{Digest, Sha256};
 /// and then on purpose: every published default result changes with it.
 const DEFAULT_DIGEST: &str = "e070e1fefac703b2c818b9e4919b5b2b06d73352db96732935e6f188b82739f8";
 
-fn digest(recordings: &[Recording]) -> String {
+fn digest<'r>(recordings: impl IntoIterator<Item = &'r Recording>) -> String {
     let mut hash = Sha256::new();
     for recording in recordings {
         hash.update(recording.id.as_bytes());

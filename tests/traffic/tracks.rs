@@ -18,7 +18,7 @@ use crate::common::mined::recordings;
 use crate::common::quintic;
 
 pub fn generated() -> Recording {
-    recordings(1)[0].clone()
+    Recording::clone(recordings(1)[0])
 }
 
 /// Two minutes of it.

@@ -35,7 +35,7 @@ pub fn class_index(class: VehicleClass) -> usize {
 }
 
 /// Counts over all recordings, each `duration_s` long with `window_m` of road.
-pub fn measure(recordings: &[Recording], duration_s: f64, window_m: f64) -> Traffic {
+pub fn measure(recordings: &[&Recording], duration_s: f64, window_m: f64) -> Traffic {
     let mut traffic = Traffic::default();
     let (mut directions, mut lanes, mut samples) = (0, 0, 0.0);
     for recording in recordings {
