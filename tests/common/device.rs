@@ -38,24 +38,21 @@ pub fn patched(from: &str, to: &str) -> Option<GpuBackend> {
     tampered(GpuOptions::default(), Tampering { shader_patch, ..Default::default() })
 }
 
-/// The device is lost for good before a job.
+/// Before a job the device is lost for good, or has no memory for it.
 #[cfg(feature = "gpu")]
-pub fn lost_at(at_job: u64) -> Tampering {
-    let before_job = move |job, device: &wgpu::Device| {
-        if job == at_job {
+pub fn failing_at(at_job: u64, is_lost: bool) -> Option<GpuBackend> {
+    let before_job = move |job, device: &wgpu::Device| match job == at_job {
+        true if is_lost => {
             device.destroy();
+            Ok(())
         }
-        Ok(())
+        true => Err("it has no memory for this job"),
+        false => Ok(()),
     };
-    Tampering { before_job: Some(std::sync::Arc::new(before_job)), ..Default::default() }
-}
-
-/// The device has no memory for a job.
-#[cfg(feature = "gpu")]
-pub fn out_of_memory_at(at_job: u64) -> Tampering {
-    let before_job =
-        move |job, _: &wgpu::Device| if job == at_job { Err("it has no memory for this job") } else { Ok(()) };
-    Tampering { before_job: Some(std::sync::Arc::new(before_job)), ..Default::default() }
+    tampered(
+        GpuOptions::default(),
+        Tampering { before_job: Some(std::sync::Arc::new(before_job)), ..Default::default() },
+    )
 }
 
 #[cfg(feature = "gpu")]

@@ -10,11 +10,6 @@ use lanesweep::traffic::mining::mine;
 use lanesweep::traffic::trajectory::generator::generate_one;
 use rayon::prelude::*;
 
-pub fn mined(recordings: usize) -> Collection {
-    let generator = GeneratorOptions { recordings, ..GeneratorOptions::default() };
-    mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap()
-}
-
 /// Those of the first recordings, each mined once: it is the same whatever their number.
 pub fn scenarios_of(recordings: usize) -> &'static [Scenario] {
     type Known = (Vec<Vec<Scenario>>, BTreeMap<usize, &'static [Scenario]>);
@@ -26,11 +21,6 @@ pub fn scenarios_of(recordings: usize) -> &'static [Scenario] {
         parts.extend(more);
         parts[..recordings].concat().leak()
     })
-}
-
-/// Those of the default study.
-pub fn scenarios() -> &'static [Scenario] {
-    scenarios_of(24)
 }
 
 pub fn kept(scenarios: &[Scenario], category: Category) -> Vec<&Scenario> {

@@ -80,6 +80,11 @@ pub fn numbers<T: serde::de::DeserializeOwned>(value: &serde_json::Value) -> Vec
     serde_json::from_value(value.clone()).unwrap()
 }
 
+/// Equal, or within a tolerance of one and their size.
+pub fn near(ours: f64, theirs: f64, tolerance: f64) -> bool {
+    ours == theirs || (ours - theirs).abs() <= tolerance * (1.0 + theirs.abs())
+}
+
 /// The share of a smooth motion that is done after a share of its time.
 pub fn quintic(part: f64) -> f64 {
     let p = part.clamp(0.0, 1.0);
@@ -118,19 +123,11 @@ fn unpack_sumo_recordings() -> Option<PathBuf> {
         skipped(&format!("needs `unzip` or `python3` to unpack {}", archive.display()));
         return None;
     }
-    let content = folder_with_tracks(&mine)?;
+    let tracks = program::names(&mine).into_iter().find(|name| name.ends_with("01_tracks.csv"))?;
+    let content = mine.join(tracks).parent()?.to_owned();
     if std::fs::rename(&content, &ready).is_ok() || ready.is_dir() {
         let _ = std::fs::remove_dir_all(&mine);
         return Some(ready);
     }
     Some(content)
-}
-
-/// The folder itself or the one below it that holds `01_tracks.csv`.
-fn folder_with_tracks(folder: &std::path::Path) -> Option<PathBuf> {
-    if folder.join("01_tracks.csv").exists() {
-        return Some(folder.to_path_buf());
-    }
-    let below = std::fs::read_dir(folder).ok()?.flatten().map(|entry| entry.path());
-    below.filter(|path| path.is_dir()).find_map(|path| folder_with_tracks(&path))
 }

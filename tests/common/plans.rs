@@ -40,10 +40,6 @@ pub fn plan(blocks: &[(Category, usize, &[&str])]) -> LanePlan {
     LanePlan::new(profile, ModelId::ALL.to_vec(), Headway::paper(), blocks, Arc::new(OneCase(case, tables))).unwrap()
 }
 
-pub fn verdicts(failed: &[Criterion]) -> Verdicts {
-    Verdicts(failed.iter().map(|c| 1 << c.index()).sum())
-}
-
 /// A chunk of a plan whose lanes fail as told; min TTC as told too.
 pub fn chunk(
     plan: &LanePlan,

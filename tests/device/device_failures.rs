@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::common::device::{lost_at, open, out_of_memory_at, patched, tampered};
+use crate::common::device::{failing_at, open, patched};
 use crate::common::lane_sets::{of_model, swept_on_cpu};
 use lanesweep::engine::gpu::{GpuBackend, GpuOptions};
 use lanesweep::engine::verify::{SetOptions, random_plan};
@@ -55,9 +55,9 @@ fn a_device_that_is_lost_has_no_memory_or_does_not_answer_in_time_leaves_complet
     let plan = plan();
     let expected = expected(&plan);
     let slow = GpuOptions { timeout: Duration::from_millis(1), first_lanes: 1 << 20, ..Default::default() };
-    let lost = |at_job| tampered(GpuOptions::default(), lost_at(at_job));
-    let no_memory = tampered(GpuOptions::default(), out_of_memory_at(1));
-    for (what, gpu) in [("lost", lost(0)), ("lost", lost(3)), ("no memory", no_memory), ("slow", open(slow))] {
+    let lost = |at_job| failing_at(at_job, true);
+    let all = [("lost", lost(0)), ("lost", lost(3)), ("no memory", failing_at(1, false)), ("slow", open(slow))];
+    for (what, gpu) in all {
         let Some(gpu) = gpu else { return };
         let (verdicts, summary) = swept(&plan, &gpu);
         assert!(verdicts == expected && summary.lanes == plan.lane_count(), "{what}");

@@ -12,6 +12,7 @@ use serde_json::json;
 use crate::common::counting::Counting;
 use crate::common::dice::Dice;
 use crate::common::lane_sets::{forms, random, run_case, run_lane, thresholds};
+use crate::common::near;
 
 fn run_in<R: Real>(profile: &Profile, case: &Case, model: ModelId, thw: f64) -> Outcome<f64> {
     run_case(profile, case, model, Start::Headway(R::from_f64(thw)), &mut |_| ())
@@ -239,8 +240,7 @@ fn s_prime_equals_s_when_the_recorded_motion_has_the_parameterized_form() {
         for (model, thw) in drives() {
             let (s, prime) = (run(&profile, &recorded, model, thw), run(&profile, &parameterized, model, thw));
             assert_eq!((s.verdicts, s.contact), (prime.verdicts, prime.contact), "{key} {model:?} {thw}");
-            let near = |a: f64, b: f64| a == b || (a - b).abs() < 1e-6 * (1.0 + a.abs());
-            assert!(near(s.min_gap, prime.min_gap), "{key} {model:?} {thw}: {} {}", s.min_gap, prime.min_gap);
+            assert!(near(s.min_gap, prime.min_gap, 1e-6), "{key} {model:?} {thw}: {} {}", s.min_gap, prime.min_gap);
         }
     }
 }

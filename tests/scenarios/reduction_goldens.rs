@@ -1,16 +1,12 @@
 //! The decomposition, the sinusoid and their goldens.
 
-use crate::common::{golden_json, numbers, shared};
+use crate::common::{golden_json, near, numbers, shared};
 
 use lanesweep::Result;
 use lanesweep::scenario::parameterization::{SeriesScale, SvdBasis, fit_svd};
 
 fn svd(rows: &[Vec<f64>], series: usize, what: &str) -> Result<SvdBasis> {
     fit_svd(rows, (series, None), 50, 5, SeriesScale::PerInstant, what)
-}
-
-fn near(ours: f64, theirs: f64, tolerance: f64) -> bool {
-    (ours - theirs).abs() <= tolerance * (1.0 + theirs.abs())
 }
 
 fn check_case(case: &serde_json::Value, basis: &SvdBasis, data: &[Vec<f64>]) {

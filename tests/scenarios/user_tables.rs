@@ -2,7 +2,7 @@
 #![cfg(feature = "parquet")]
 
 use crate::common::program::{ran, said};
-use crate::common::{CASES, made};
+use crate::common::{CASES, made, near};
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -53,10 +53,6 @@ fn before_end(series: &str) -> Vec<f64> {
     before_end.iter().flat_map(|line| line.split(',')).filter_map(|field| field.parse().ok()).collect()
 }
 
-fn near((a, b): (&f64, &f64)) -> bool {
-    a == b || (a - b).abs() <= 1e-6 * (1.0 + a.abs())
-}
-
 #[test]
 fn parameters_make_the_scenarios_that_simulate_runs() {
     let read = of("p.csv", CASES).unwrap();
@@ -78,7 +74,10 @@ fn parameters_make_the_scenarios_that_simulate_runs() {
         assert!(by_row.lines().count() > 20);
         let (x, y) = (before_end(&by_row), before_end(&by_lane));
         let lines = x.len().min(y.len());
-        assert!(lines > 200 && x.iter().zip(&y).take(lines).all(near), "{lane}:\n{by_row}\n{by_lane}");
+        assert!(
+            lines > 200 && x.iter().zip(&y).take(lines).all(|(a, b)| near(*a, *b, 1e-6)),
+            "{lane}:\n{by_row}\n{by_lane}"
+        );
     }
     let study = ran(dir.path(), "-q study --scenarios p.csv --out out --backend cpu");
     assert!(study.contains("cut-in"), "{study}");
@@ -104,7 +103,7 @@ fn a_row_is_the_same_case_in_every_verb_and_ends_its_motions_after_its_duration(
     let (row, lane) = (of(row), of(&format!("{lane} a/S/1.2s/FSM")));
     assert!(row.len() > 200, "{}", row.len());
     assert_eq!(row.len(), lane.len());
-    assert!(row.iter().zip(&lane).all(near));
+    assert!(row.iter().zip(&lane).all(|(a, b)| near(*a, *b, 1e-6)));
 }
 
 fn texts(values: &[&str]) -> ArrayRef {

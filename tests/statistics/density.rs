@@ -1,7 +1,7 @@
 //! Densities: what published programs give, what must hold of any, and the way from a scenario to a point and to a case.
 
 use crate::common::mined::{self, scenarios_of};
-use crate::common::{golden_json, numbers, with_threads};
+use crate::common::{golden_json, near, numbers, with_threads};
 
 use lanesweep::prelude::*;
 use lanesweep::scenario::parameterization::{Family, ParameterizationOptions, Reduction, Sizes, SvdLateral, Variable};
@@ -28,7 +28,7 @@ fn number(value: &Value) -> f64 {
 }
 
 fn assert_near(ours: f64, theirs: f64, tolerance: f64, what: &str) {
-    assert!((ours - theirs).abs() <= tolerance * (1.0 + theirs.abs()), "{what}: {ours} instead of {theirs}");
+    assert!(near(ours, theirs, tolerance), "{what}: {ours} instead of {theirs}");
 }
 
 fn names(d: usize) -> Vec<&'static str> {

@@ -72,10 +72,6 @@ fn fcd(vehicles: &[Driven], change_s: f64) -> String {
     format!("{header}\n0.00;;;;;;;;;\n") + &samples(vehicles, 14, change_s).iter().map(row).collect::<String>()
 }
 
-fn gap_m(ego: &Track, lead: &Track) -> f64 {
-    lead.s_m[0] - ego.s_m[0] - 0.5 * (ego.length_m + lead.length_m)
-}
-
 #[test]
 fn the_gap_behind_a_truck_of_sumo_is_measured_from_its_front_bumper() {
     let dir = tempfile::tempdir().unwrap();
@@ -85,7 +81,8 @@ fn the_gap_behind_a_truck_of_sumo_is_measured_from_its_front_bumper() {
     let recording = load(&path).unwrap().remove(0).recording;
     let [truck, car] = &recording.tracks[..] else { panic!("{:?}", recording.tracks.len()) };
     assert_eq!(truck.class, VehicleClass::Truck);
-    assert!((gap_m(car, truck) - 35.9).abs() < 1e-9, "{}", gap_m(car, truck));
+    let gap_m = truck.s_m[0] - car.s_m[0] - 0.5 * (car.length_m + truck.length_m);
+    assert!((gap_m - 35.9).abs() < 1e-9, "{gap_m}");
 }
 
 #[test]
