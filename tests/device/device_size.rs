@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use crate::common::device::software_device;
+use crate::common::device::open;
 use crate::common::plans;
-use lanesweep::engine::gpu::{GpuBackend, GpuOptions};
+use lanesweep::engine::gpu::GpuOptions;
 use lanesweep::engine::{CaseSource, LaneCase, LanePlan, Verdicts};
 use lanesweep::prelude::*;
 use lanesweep::scenario::Tables;
@@ -56,8 +56,7 @@ fn expected(plan: &LanePlan, lane: u64) -> Verdicts {
 }
 
 fn assert_every_lane(plan: &LanePlan, first_lanes: u64) {
-    let Some((adapters, index)) = software_device() else { return };
-    let gpu = GpuBackend::open(&adapters, index, GpuOptions { first_lanes, ..Default::default() }).unwrap();
+    let Some(gpu) = open(GpuOptions { first_lanes, ..Default::default() }) else { return };
     let mut lane = 0;
     let all = 0..plan.unit_count();
     let summary = Executor::new(&gpu).sweep(plan, all.clone(), Wanted::Verdicts, |chunk| {

@@ -380,11 +380,8 @@ fn cases_15_and_16_the_demand_of_eu_2022_1426_begins_at_the_published_times_befo
                 under(profile.clone(), &case(Category::CutIn, 100.0 * KMH, 100.0 * KMH - closing), Headway::GapM(gap_m))
             };
             let (above, below) = (with_ttc(published_s + 0.011), with_ttc(published_s - 0.011));
-            assert_eq!(
-                (above.demand(), below.demand()),
-                (Some(Demand::Avoid), Some(Demand::Nothing)),
-                "{name}, {kmh} km/h"
-            );
+            let demands = (above.demand(), below.demand());
+            assert_eq!(demands, (Some(Demand::Avoid), Some(Demand::Nothing)), "{name}, {kmh} km/h");
             near(reading(&above, "(c)").threshold, published_s, 0.01);
             assert!(above.clause.starts_with("EU 2022/1426"));
             assert!(!above.readings.iter().any(|reading| reading.quantity.starts_with("(b)")));

@@ -140,10 +140,9 @@ fn the_bits_of_lanes_are_those_of_the_engine_version() {
     for name in Profile::names() {
         for dt_s in [0.04, 0.1] {
             let profile = Profile::load(name).unwrap().with_dt(dt_s).unwrap();
-            let random = SetOptions { size: 80, models: models(), ..SetOptions::default() };
-            count += lanes(&mut digests, &random_plan(&profile, &random).unwrap());
-            let thresholds = SetOptions { size: 1, models: models(), ..SetOptions::default() };
-            count += lanes(&mut digests, &threshold_plan(&profile, &thresholds).unwrap());
+            let of = |size| SetOptions { size, models: models(), ..SetOptions::default() };
+            count += lanes(&mut digests, &random_plan(&profile, &of(80)).unwrap());
+            count += lanes(&mut digests, &threshold_plan(&profile, &of(1)).unwrap());
             count += lanes(&mut digests, &study(&profile));
             if name != "jrc-2021" {
                 samples(&mut digests, &profile);

@@ -111,10 +111,8 @@ fn a_sheet_names_program_and_profile_and_a_comment_is_no_other_profile() {
     assert!(!page.contains(none) && other_page.contains(none));
     let program = ours["program"].as_str().unwrap();
     let commit = ours["identity"]["commit"].as_str().map_or("unknown", |commit| commit);
-    assert!(
-        page.contains(&format!("{program}, commit {commit}, engine {}", ours["identity"]["engine_version"])),
-        "{commit}"
-    );
+    let named = format!("{program}, commit {commit}, engine {}", ours["identity"]["engine_version"]);
+    assert!(page.contains(&named), "{named}");
 }
 
 /// For who reads the chapter in place of a sheet.

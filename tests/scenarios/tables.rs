@@ -41,10 +41,8 @@ fn a_study_gives_the_same_bytes_from_parquet_and_from_json_lines() {
         ["recordings", "mining", "notes"].map(|key| record[key].clone())
     };
     let recorded = record("rec");
-    assert!(
-        recorded[0].as_array().unwrap().iter().all(|of| of["files"].as_array().unwrap().len() == 3),
-        "{recorded:?}"
-    );
+    let files = |of: &serde_json::Value| of["files"].as_array().unwrap().len();
+    assert!(recorded[0].as_array().unwrap().iter().all(|of| files(of) == 3), "{recorded:?}");
     for file in ["s.jsonl", "s.parquet"] {
         assert_eq!(record(&format!("--scenarios {file} --config mining.leader_max_thw_s=9")), recorded, "{file}");
     }

@@ -85,12 +85,11 @@ fn no_two_vehicles_overlap() {
                     let (p, q) = (a.index_of(frame as i64).unwrap(), b.index_of(frame as i64).unwrap());
                     let along = (a.s_m[p] - b.s_m[q]).abs() - 0.5 * (a.length_m + b.length_m);
                     let across = (a.d_m[p] - b.d_m[q]).abs() - 0.5 * (a.width_m + b.width_m);
+                    let is_apart = a.carriageway != b.carriageway || along > 0.0 || across > 0.0;
                     assert!(
-                        a.carriageway != b.carriageway || along > 0.0 || across > 0.0,
-                        "{} frame {frame}: {} and {} overlap by {along:.2} m and {across:.2} m",
-                        recording.id,
-                        a.id,
-                        b.id
+                        is_apart,
+                        "{}, frame {frame}: {} and {} overlap by {along}, {across} m",
+                        recording.id, a.id, b.id
                     );
                 }
             }

@@ -246,10 +246,8 @@ fn a_recording_that_the_format_cannot_hold_is_refused_and_nothing_is_written() {
 fn every_sumo_recording_reads_and_its_written_form_reads_alike() {
     let Some(dir) = common::sumo_recordings() else { return };
     let inventory = highd::inventory(&dir).unwrap();
-    assert_eq!(
-        inventory.recordings.iter().map(|files| files.id.as_str()).collect::<Vec<_>>(),
-        ["01", "02", "03", "04"]
-    );
+    let ids: Vec<&str> = inventory.recordings.iter().map(|files| files.id.as_str()).collect();
+    assert_eq!(ids, ["01", "02", "03", "04"]);
     // Numbers from recordingMeta: vehicles, lanes above, lanes below.
     let expected = [(349, 3, 3), (222, 2, 2), (439, 3, 3), (376, 3, 4)];
     for (files, (vehicles, upper, lower)) in inventory.recordings.iter().zip(expected) {
