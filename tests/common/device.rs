@@ -1,7 +1,5 @@
 //! Where device tests find a device: a software Vulkan, which any machine can have.
 
-use std::io::Write;
-
 use lanesweep::engine::Backend;
 #[cfg(feature = "gpu")]
 use lanesweep::engine::gpu::{Adapters, Api, DeviceKind, GpuBackend, GpuOptions, Tampering};
@@ -75,6 +73,5 @@ pub fn software_backend() -> Option<Box<dyn Backend>> {
 
 fn without_device(why: &str) {
     assert!(std::env::var_os("LANESWEEP_REQUIRE_DEVICE").is_none(), "LANESWEEP_REQUIRE_DEVICE is set, but this {why}");
-    // Past the test harness, which shows the output of failing tests only.
-    let _ = writeln!(std::io::stderr(), "SKIPPED: {why}");
+    super::skipped(why);
 }

@@ -15,11 +15,11 @@ const KEPT: [&str; 2] = ["f1", "radar"];
 fn the_tables_of_the_figures_are_those_that_were_looked_at() {
     let dir = tempfile::tempdir().unwrap();
     write_scenarios(&dir.path().join("s.jsonl"), scenarios_of(12)).unwrap();
-    ran(dir.path(), "-q study --scenarios s.jsonl --categories cut-in --thw 0.4,1.2 --backend cpu --out .");
+    ran(dir.path(), "-q study --scenarios s.jsonl --categories cut-in --thw 0.4,1.2 --backend cpu --out out");
     let kept = in_crate("tests/figures");
     for figure in KEPT {
         let name = format!("{figure}-cut-in.csv");
-        let now = fs::read_to_string(dir.path().join("tables").join(&name)).unwrap();
+        let now = fs::read_to_string(dir.path().join("out/tables").join(&name)).unwrap();
         if std::env::var_os("LANESWEEP_RENEW_FIGURES").is_some() {
             fs::write(kept.join(&name), &now).unwrap();
         }

@@ -2,10 +2,11 @@
 //! undisturbed. Long: `LANESWEEP_KILLS=300 cargo test --release --test commands kills:: -- --nocapture`
 #![cfg(unix)]
 
-use crate::common::mined::write_cut_in_density;
+use crate::common::mined::density_of;
 use crate::common::program::{self, Files, ended, kill, names, ran, same, unbroken, without_times, words};
 use crate::common::{Folder, folder};
 
+use lanesweep::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Child;
@@ -88,7 +89,7 @@ fn put(dir: &Path, from: Option<&str>) {
 fn furnished() -> Folder {
     static MADE: LazyLock<Files> = LazyLock::new(|| {
         let dir = &*crate::common::folder();
-        write_cut_in_density(&dir.join("d.json"));
+        write_density(&dir.join("d.json"), &density_of(2, Category::CutIn, "2", false)).unwrap();
         done(dir, "study --synth-recordings 1 --config study.reference=true --dt 0.02 --plan-only --out plan");
         program::copy(&dir.join("plan"), &dir.join("parts"));
         let _ = ["0/2", "1/2"]
