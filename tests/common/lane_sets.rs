@@ -1,7 +1,7 @@
 //! Lanes to compare backends with: profiles in which every option takes every form, and plans.
 use super::mined::scenarios_of;
 use lanesweep::engine::verify::{Comparison, SetOptions, compare, random_plan, threshold_plan};
-use lanesweep::engine::{Backend, Chunk, Constants, LaneCase, LanePlan, Start, Step, Verdicts, same_words};
+use lanesweep::engine::{Backend, Chunk, Constants, LaneCase, LanePlan, Start, Step, same_words};
 use lanesweep::model::criterion::{BtnContact, BtnForm, LateralGate};
 use lanesweep::model::profile::{CutOutEvaluated, CutOutTarget};
 use lanesweep::model::scalar::Real;
@@ -99,8 +99,9 @@ pub fn assert_same_in_calls(plan: &LanePlan, backend: &dyn Backend, units: u64, 
         from = to;
     }
     assert!(outcomes.len() == expected.len() && verdicts.len() == expected.len(), "{what}");
-    assert!(outcomes.iter().zip(expected).all(|(a, b)| same_words(a, b)), "{what}");
-    assert!(verdicts.iter().zip(expected).all(|(a, b): (&Verdicts, _)| *a == b.verdicts), "{what}");
+    let differs = |at: &usize| !same_words(&outcomes[*at], &expected[*at]) || verdicts[*at] != expected[*at].verdicts;
+    let first = (0..expected.len()).find(differs).map(|at| plan.key_text(&plan.key(at as u64).unwrap()));
+    assert_eq!(first, None, "{what}, {}", backend.describe());
 }
 
 /// Outcomes, verdicts and counts of a backend are those of the scalar lanes.

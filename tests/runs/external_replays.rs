@@ -9,7 +9,7 @@ use std::path::Path;
 
 /// The scenarios of some generated recordings as `scenarios.jsonl`, and the kept ones.
 fn mined(dir: &Path) -> Vec<Value> {
-    write_scenarios(&dir.join("scenarios.jsonl"), scenarios_of(8)).unwrap();
+    write_scenarios(&dir.join("scenarios.jsonl"), scenarios_of(3)).unwrap();
     let lines = std::fs::read_to_string(dir.join("scenarios.jsonl")).unwrap();
     lines.lines().map(|line| line.parse::<Value>().unwrap()).filter(|row| row["kept"] == true).collect()
 }

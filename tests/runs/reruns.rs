@@ -27,10 +27,10 @@ fn left_plan(path: &Path) -> LanePlan {
 #[test]
 fn random_lanes_of_a_study_are_the_studys_lanes() {
     let dir = &*crate::common::folder();
-    ran(dir, "-q study --synth-recordings 12 --backend cpu --out result");
+    ran(dir, "-q study --synth-recordings 4 --backend cpu --out result");
     // The study itself, as it sweeps: in batches, on the widest instructions.
     let options = StudyOptions { folds: Some(5), ..StudyOptions::default() };
-    let study = plan_study(scenarios_of(12), &Profile::load("paper").unwrap(), &options).unwrap();
+    let study = plan_study(scenarios_of(4), &Profile::load("paper").unwrap(), &options).unwrap();
     let outcomes = swept_on_cpu(&study, Wanted::Outcomes).outcomes;
     assert_eq!(outcomes.len() as u64, study.lane_count());
     // The reruns: from the folder.
