@@ -104,7 +104,7 @@ pub fn assert_same_in_calls(plan: &LanePlan, backend: &dyn Backend, units: u64, 
     assert_eq!(first, None, "{what}, {}", backend.describe());
 }
 
-/// Outcomes, verdicts and counts of a backend are those of the scalar lanes.
+/// Outcomes, and verdicts asked for alone, of a backend are those of the scalar lanes.
 pub fn assert_equal(what: &str, plan: &LanePlan, backend: &dyn Backend) {
     let found = compare(what, plan, backend, |_| ()).unwrap_or_else(|error| panic!("{what}: {error}"));
     let Comparison { worst, modes_differing, .. } = &found;
