@@ -24,6 +24,7 @@ impl OperationCount {
 
 thread_local! {
     static COUNT: Cell<OperationCount> = const { Cell::new(OperationCount { additions: 0, multiplications: 0, divisions: 0, comparisons: 0, unbounded: 0 }) };
+    static FLIPS_ZEROS: Cell<bool> = const { Cell::new(false) };
 }
 
 fn count(counter: impl FnOnce(&mut OperationCount) -> &mut u64) {
@@ -32,10 +33,6 @@ fn count(counter: impl FnOnce(&mut OperationCount) -> &mut u64) {
         *counter(&mut now) += 1;
         cell.set(now);
     });
-}
-
-thread_local! {
-    static FLIPS_ZEROS: Cell<bool> = const { Cell::new(false) };
 }
 
 /// A result, or if it is zero and signs of zeros are flipped, −0 after every second operation.

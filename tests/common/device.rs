@@ -1,7 +1,5 @@
 //! Where device tests find a device: a software Vulkan, which any machine can have.
 
-use std::io::Write;
-
 use lanesweep::engine::Backend;
 #[cfg(feature = "gpu")]
 use lanesweep::engine::gpu::{Adapters, Api, DeviceKind, GpuBackend, GpuOptions, Tampering};
@@ -38,24 +36,21 @@ pub fn patched(from: &str, to: &str) -> Option<GpuBackend> {
     tampered(GpuOptions::default(), Tampering { shader_patch, ..Default::default() })
 }
 
-/// The device is lost for good before a job.
+/// Before a job the device is lost for good, or has no memory for it.
 #[cfg(feature = "gpu")]
-pub fn lost_at(at_job: u64) -> Tampering {
-    let before_job = move |job, device: &wgpu::Device| {
-        if job == at_job {
+pub fn failing_at(at_job: u64, is_lost: bool) -> Option<GpuBackend> {
+    let before_job = move |job, device: &wgpu::Device| match job == at_job {
+        true if is_lost => {
             device.destroy();
+            Ok(())
         }
-        Ok(())
+        true => Err("it has no memory for this job"),
+        false => Ok(()),
     };
-    Tampering { before_job: Some(std::sync::Arc::new(before_job)), ..Default::default() }
-}
-
-/// The device has no memory for a job.
-#[cfg(feature = "gpu")]
-pub fn out_of_memory_at(at_job: u64) -> Tampering {
-    let before_job =
-        move |job, _: &wgpu::Device| if job == at_job { Err("it has no memory for this job") } else { Ok(()) };
-    Tampering { before_job: Some(std::sync::Arc::new(before_job)), ..Default::default() }
+    tampered(
+        GpuOptions::default(),
+        Tampering { before_job: Some(std::sync::Arc::new(before_job)), ..Default::default() },
+    )
 }
 
 #[cfg(feature = "gpu")]
@@ -78,6 +73,5 @@ pub fn software_backend() -> Option<Box<dyn Backend>> {
 
 fn without_device(why: &str) {
     assert!(std::env::var_os("LANESWEEP_REQUIRE_DEVICE").is_none(), "LANESWEEP_REQUIRE_DEVICE is set, but this {why}");
-    // Past the test harness, which shows the output of failing tests only.
-    let _ = writeln!(std::io::stderr(), "SKIPPED: {why}");
+    super::skipped(why);
 }

@@ -1,28 +1,26 @@
 //! Scenarios of the generator, and densities over them.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, LazyLock, Mutex, OnceLock};
+use std::path::Path;
+use std::sync::{Arc, Mutex, OnceLock};
 
-use lanesweep::scenario::parameterization::Parameterization;
-use lanesweep::scenario::{Category, DataProvenance, Scenario};
-use lanesweep::stats::density::{DensityModel, FitOptions};
-use lanesweep::traffic::mining::{Collection, MiningOptions, mine_generated};
-use lanesweep::traffic::trajectory::Recording;
-use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate};
+use lanesweep::prelude::*;
+use lanesweep::scenario::DataProvenance;
+use lanesweep::traffic::mining::mine;
+use lanesweep::traffic::trajectory::generator::generate_one;
+use rayon::prelude::*;
 
-pub fn mined(recordings: usize) -> Collection {
-    let generator = GeneratorOptions { recordings, ..GeneratorOptions::default() };
-    mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap()
-}
-
+/// Those of the first recordings, each mined once: it is the same whatever their number.
 pub fn scenarios_of(recordings: usize) -> &'static [Scenario] {
-    static MINED: Mutex<BTreeMap<usize, &'static [Scenario]>> = Mutex::new(BTreeMap::new());
-    MINED.lock().unwrap().entry(recordings).or_insert_with(|| mined(recordings).scenarios.leak())
-}
-
-/// Those of the default study.
-pub fn scenarios() -> &'static [Scenario] {
-    scenarios_of(24)
+    type Known = (Vec<Vec<Scenario>>, BTreeMap<usize, &'static [Scenario]>);
+    static KNOWN: Mutex<Known> = Mutex::new((Vec::new(), BTreeMap::new()));
+    let (parts, joined) = &mut *KNOWN.lock().unwrap();
+    joined.entry(recordings).or_insert_with(|| {
+        let scenarios = |of: &&Recording| mine(of, &MiningOptions::default()).scenarios;
+        let more: Vec<_> = self::recordings(recordings).par_iter().skip(parts.len()).map(scenarios).collect();
+        parts.extend(more);
+        parts[..recordings].concat().leak()
+    })
 }
 
 pub fn kept(scenarios: &[Scenario], category: Category) -> Vec<&Scenario> {
@@ -34,10 +32,14 @@ pub fn provenance() -> DataProvenance {
 }
 
 /// The first of the default recordings, made once: each is the same whatever their number.
-pub fn recordings(count: usize) -> &'static [Recording] {
-    static MADE: LazyLock<Vec<Recording>> =
-        LazyLock::new(|| generate(&GeneratorOptions { recordings: 28, ..GeneratorOptions::default() }).unwrap());
-    &MADE[..count]
+pub fn recordings(count: usize) -> Vec<&'static Recording> {
+    static MADE: Mutex<Vec<&Recording>> = Mutex::new(Vec::new());
+    let mut made = MADE.lock().unwrap();
+    let generator = GeneratorOptions { recordings: count, ..GeneratorOptions::default() };
+    let one = |index| &*Box::leak(Box::new(generate_one(&generator, index).unwrap()));
+    let more: Vec<_> = (made.len()..count).into_par_iter().map(one).collect();
+    made.extend(more);
+    made[..count].to_vec()
 }
 
 /// The density of a parameterization over the scenarios of the first recordings, fitted once.
@@ -46,6 +48,11 @@ pub fn density_of(recordings: usize, category: Category, key: &str, with_thw: bo
     static FITTED: Mutex<Fitted> = Mutex::new(BTreeMap::new());
     let cell = FITTED.lock().unwrap().entry((recordings, category, key.to_owned(), with_thw)).or_default().clone();
     cell.get_or_init(|| fitted(scenarios_of(recordings), category, key, with_thw)).clone()
+}
+
+/// The density of cut-ins by parameterization 2 that runs of the program sample, as a file.
+pub fn write_cut_in_density(path: &Path) {
+    write_density(path, &density_of(24, Category::CutIn, "2", false)).unwrap();
 }
 
 /// A density over scenarios, with few draws for what is valid.

@@ -1,11 +1,9 @@
 //! Plans and chunks without physics: every verdict is chosen by the test.
 use std::sync::Arc;
 
-use lanesweep::engine::{Block, CaseSource, Chunk, Headway, LaneCase, LanePlan, LaneRunner, Outcome, Verdicts};
-use lanesweep::model::criterion::Criterion;
-use lanesweep::model::driver::ModelId;
-use lanesweep::model::profile::Profile;
-use lanesweep::scenario::{Case, Category, Lateral, Participant, Speed, Tables};
+use lanesweep::engine::{Block, CaseSource, Chunk, LaneCase, LanePlan, LaneRunner, Verdicts};
+use lanesweep::prelude::*;
+use lanesweep::scenario::{Case, Lateral, Participant, Speed, Tables};
 
 struct OneCase(LaneCase<f64>, Tables<f64>);
 
@@ -40,10 +38,6 @@ pub fn plan(blocks: &[(Category, usize, &[&str])]) -> LanePlan {
     let case = LaneCase::encode(&beside(0.0), &profile, &mut tables);
     let blocks = blocks.iter().map(|(category, units, variants)| block(*category, *units, variants)).collect();
     LanePlan::new(profile, ModelId::ALL.to_vec(), Headway::paper(), blocks, Arc::new(OneCase(case, tables))).unwrap()
-}
-
-pub fn verdicts(failed: &[Criterion]) -> Verdicts {
-    Verdicts(failed.iter().map(|c| 1 << c.index()).sum())
 }
 
 /// A chunk of a plan whose lanes fail as told; min TTC as told too.

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use super::exid::Plain;
 use lanesweep::Result;
 use lanesweep::model::plausibility::Implausible;
 use lanesweep::traffic::trajectory::highd::{self, HighdFiles};
@@ -96,22 +97,8 @@ impl Texts {
 
 /// The table with one field replaced; lines are counted from 1 and include the header.
 pub fn with_field(table: &str, line: usize, column: &str, value: &str) -> String {
-    let at = table.lines().next().unwrap().split(',').position(|name| name == column).expect("a column of the table");
-    let edit = |(number, text): (usize, &str)| {
-        let mut fields: Vec<&str> = text.split(',').collect();
-        if number + 1 == line {
-            fields[at] = value;
-        }
-        fields.join(",") + "\n"
-    };
-    table.lines().enumerate().map(edit).collect()
-}
-
-pub fn without_column(table: &str, column: &str) -> String {
-    let at = table.lines().next().unwrap().split(',').position(|name| name == column).expect("a column of the table");
-    let short = |text: &str| {
-        let fields = text.split(',').enumerate().filter(|(index, _)| *index != at).map(|(_, field)| field);
-        fields.collect::<Vec<_>>().join(",") + "\n"
-    };
-    table.lines().map(short).collect()
+    let mut table = Plain::of_text(table);
+    let at = table.at(column);
+    value.clone_into(&mut table.rows[line - 2][at]);
+    table.text()
 }

@@ -3,13 +3,9 @@
 use crate::common::device::{open, patched};
 use crate::common::mined::density_of;
 use lanesweep::engine::gpu::GpuOptions;
-use lanesweep::engine::{Backend, CpuBackend, Executor, Headway, SampleTally};
-use lanesweep::model::driver::ModelId;
-use lanesweep::model::profile::Profile;
-use lanesweep::run::sampling::{Estimator, Sample, SampleHeadways, SampleOptions};
-use lanesweep::scenario::Category;
-use lanesweep::stats::density::DensityModel;
-use lanesweep::{Error, Result};
+use lanesweep::engine::{Backend, SampleTally};
+use lanesweep::prelude::*;
+use lanesweep::run::sampling::Estimator;
 
 /// A tally of all samples in chunks of `chunk_lanes` lanes.
 fn tally(

@@ -1,17 +1,12 @@
 //! `devices`, `verify`, `--backend` and `--device` as their users type them.
 
 use crate::common::device::software_device;
-use crate::common::program::{files, json, ran, said, same, without_host};
+use crate::common::program::{command, files, json, ran, said, same, without_host};
 use lanesweep::engine::BackendChoice;
 use lanesweep::engine::gpu::{Adapters, choose};
 
 fn device() -> Option<String> {
     software_device().map(|(_, index)| index.to_string())
-}
-
-/// Has this machine a GPU of its own? Then the tests of its absence say nothing.
-fn has_gpu() -> bool {
-    Adapters::enumerate().cards().iter().any(|card| card.is_real())
 }
 
 const SMALL: &str = "--synth-recordings 1 --config generator.duration_s=120";
@@ -36,7 +31,7 @@ fn a_study_on_a_device_writes_the_same_files_as_on_the_cpu() {
 
 #[test]
 fn a_gpu_that_is_not_there_has_its_own_exit_code_and_nothing_is_written() {
-    if has_gpu() {
+    if Adapters::enumerate().cards().iter().any(|card| card.is_real()) {
         return;
     }
     let dir = tempfile::tempdir().unwrap();
@@ -67,8 +62,8 @@ fn the_software_device_is_listed_but_taken_only_by_name() {
 
 #[test]
 fn a_driver_that_misses_its_runtime_folder_does_not_look_like_a_failure_of_ours() {
-    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_lanesweep"));
-    command.arg("devices").env_remove("XDG_RUNTIME_DIR").env_remove("DISPLAY").env_remove("NODEVICE_SELECT");
+    let mut command = command(std::path::Path::new("."), &["devices"]);
+    command.env_remove("XDG_RUNTIME_DIR").env_remove("DISPLAY").env_remove("NODEVICE_SELECT");
     let output = command.output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.code() == Some(0) && said.is_empty(), "{said}");

@@ -2,14 +2,12 @@
 
 use std::sync::Arc;
 
-use crate::common::device::software_device;
+use crate::common::device::open;
 use crate::common::plans;
-use lanesweep::engine::gpu::{GpuBackend, GpuOptions};
-use lanesweep::engine::{CaseSource, Executor, Headway, LaneCase, LanePlan, Verdicts, Wanted};
-use lanesweep::model::criterion::Criterion;
-use lanesweep::model::driver::ModelId;
-use lanesweep::model::profile::Profile;
-use lanesweep::scenario::{Category, Tables};
+use lanesweep::engine::gpu::GpuOptions;
+use lanesweep::engine::{CaseSource, LaneCase, LanePlan, Verdicts};
+use lanesweep::prelude::*;
+use lanesweep::scenario::Tables;
 
 /// Cases whose vehicle stands in the ego's lane or far beside it.
 struct Beside {
@@ -58,8 +56,7 @@ fn expected(plan: &LanePlan, lane: u64) -> Verdicts {
 }
 
 fn assert_every_lane(plan: &LanePlan, first_lanes: u64) {
-    let Some((adapters, index)) = software_device() else { return };
-    let gpu = GpuBackend::open(&adapters, index, GpuOptions { first_lanes, ..Default::default() }).unwrap();
+    let Some(gpu) = open(GpuOptions { first_lanes, ..Default::default() }) else { return };
     let mut lane = 0;
     let all = 0..plan.unit_count();
     let summary = Executor::new(&gpu).sweep(plan, all.clone(), Wanted::Verdicts, |chunk| {

@@ -2,8 +2,10 @@
 
 use std::collections::BTreeSet;
 use std::mem::offset_of;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use crate::common::program::names;
+use crate::common::{in_crate, text_of};
 use crate::device::wgsl::{
     Shape, constant, fields, float_operations, function_names, parse, unbounded_loops, uninitialized_in_loops,
     without_comments,
@@ -125,24 +127,6 @@ fn specialization(paired: bool) -> Specialization {
 }
 
 #[test]
-fn every_pipeline_parses_validates_and_becomes_spirv_under_every_profile() {
-    let mut compiled = 0;
-    for model in ModelId::ALL {
-        let source = shader::assemble(model);
-        // Validates with all flags and without any capability.
-        parse(&source);
-        for (place, constants) in resolved() {
-            for paired in [false, true] {
-                let constants = shader::constants(&constants, model, specialization(paired));
-                assert!(becomes_spirv(&source, shader::ENTRY, &constants), "{model:?}, {place}, paired {paired}");
-                compiled += 1;
-            }
-        }
-    }
-    assert_eq!(compiled, MODELS * Profile::names().count() * Category::ALL.len() * 2);
-}
-
-#[test]
 fn every_model_has_the_records_the_entry_the_loops_and_the_arithmetic_that_the_host_expects() {
     for model in ModelId::ALL {
         let (module, info) = parse(&shader::assemble(model));
@@ -176,8 +160,30 @@ fn same_records(module: &naga::Module, records: impl IntoIterator<Item = Record>
     }
 }
 
-fn same_constants(module: &naga::Module, constants: &[(&str, u32)]) {
-    constants.iter().for_each(|(name, value)| assert_eq!(constant(module, name), *value, "{name}"));
+fn same_constants<N: AsRef<str>>(module: &naga::Module, constants: &[(N, u32)]) {
+    constants.iter().for_each(|(name, value)| assert_eq!(constant(module, name.as_ref()), *value, "{}", name.as_ref()));
+}
+
+const MOTIONS: [MotionKind; 6] = {
+    use MotionKind::{Analytic, Centred, Instants, Mixed, Sampled, Sinusoid};
+    [Analytic, Sampled, Mixed, Centred, Sinusoid, Instants]
+};
+const CONTACTS: [Contact; 3] = [Contact::None, Contact::BySide, Contact::Frontal];
+const ENDS: [EndReason; 5] = {
+    use EndReason::{Aborted, Cap, Contact, Settled, Standstill};
+    [Contact, Settled, Standstill, Cap, Aborted]
+};
+
+/// Constants named after variants: `MotionKind::Sampled` is `MOTION_SAMPLED`.
+fn coded<T: std::fmt::Debug + Copy>(prefix: &str, all: &[T], code: impl Fn(T) -> u32) -> Vec<(String, u32)> {
+    let name = |of: &T| -> String {
+        let text = format!("{of:?}");
+        let of_char = |(at, c): (usize, char)| {
+            [if at > 0 && c.is_uppercase() { "_" } else { "" }.to_owned(), c.to_uppercase().collect()]
+        };
+        text.char_indices().flat_map(of_char).collect()
+    };
+    all.iter().map(|of| (format!("{prefix}{}", name(of)), code(*of))).collect()
 }
 
 #[test]
@@ -189,17 +195,6 @@ fn the_generator_has_the_records_the_numbers_and_the_arithmetic_of_its_rust_twin
         ("MAX_BOUNDS", MAX_BOUNDS as u32),
         ("ATTEMPTS", ATTEMPTS),
         ("NO_SLOT", NO_SLOT),
-        ("TARGET_SPEED", Variable::TargetSpeed as u32),
-        ("LATERAL_SPEED", Variable::LateralSpeed as u32),
-        ("EGO_SPEED", Variable::EgoSpeed as u32),
-        ("TARGET_ACCELERATION", Variable::TargetAcceleration as u32),
-        ("LEAD_SPEED", Variable::LeadSpeed as u32),
-        ("LEAD_ACCELERATION", Variable::LeadAcceleration as u32),
-        ("LEAD_GAP", Variable::LeadGap as u32),
-        ("DURATION", Variable::Duration as u32),
-        ("FINAL_SPEED", Variable::FinalSpeed as u32),
-        ("MEAN_DECELERATION", Variable::MeanDeceleration as u32),
-        ("TIME_HEADWAY", Variable::TimeHeadway as u32),
         ("QUANTITIES", Variable::ALL.len() as u32),
         ("PATH_SINUSOID", generated::CasePath::Sinusoid as u32),
         ("PATH_REDUCED", generated::CasePath::Reduced as u32),
@@ -209,6 +204,7 @@ fn the_generator_has_the_records_the_numbers_and_the_arithmetic_of_its_rust_twin
         ("NEVER", NEVER),
     ];
     same_constants(&module, &constants);
+    same_constants(&module, &coded("", &Variable::ALL, |of| of as u32));
     operations(&module, &info, &["exact_div"]);
     assert!(becomes_spirv(&shader::assemble_generator(), shader::GENERATE, &generator_constants()));
 }
@@ -313,13 +309,15 @@ fn every_table_has_the_stride_of_its_rust_twin() {
 }
 
 #[test]
-fn every_override_gets_a_value_of_its_type_and_no_value_is_left_over() {
+fn every_override_gets_a_value_of_its_type_no_value_is_left_over_and_every_pipeline_becomes_spirv() {
     for model in ModelId::ALL {
-        let (module, _) = parse(&shader::assemble(model));
+        let source = shader::assemble(model);
+        let (module, _) = parse(&source);
         let declared: BTreeSet<&str> = module.overrides.iter().map(|(_, o)| o.name.as_deref().unwrap()).collect();
         for (place, constants) in resolved() {
             for paired in [false, true] {
                 let given = shader::constants(&constants, model, specialization(paired));
+                assert!(becomes_spirv(&source, shader::ENTRY, &given), "{model:?}, {place}, paired {paired}");
                 let names: BTreeSet<&str> = given.iter().map(|(name, _)| *name).collect();
                 assert_eq!(names.len(), given.len(), "{model:?}: a constant is given twice");
                 assert_eq!(names, declared, "{model:?}, {place}");
@@ -349,44 +347,32 @@ fn constants_that_stand_on_both_sides_agree() {
     let expected = [
         ("SPEED_SAMPLED", SPEED_SAMPLED),
         ("LATERAL_SAMPLED", LATERAL_SAMPLED),
-        ("MOTION_ANALYTIC", MotionKind::Analytic as u32),
-        ("MOTION_SAMPLED", MotionKind::Sampled as u32),
-        ("MOTION_MIXED", MotionKind::Mixed as u32),
-        ("MOTION_CENTRED", MotionKind::Centred as u32),
-        ("MOTION_SINUSOID", MotionKind::Sinusoid as u32),
-        ("MOTION_INSTANTS", MotionKind::Instants as u32),
         ("ATTEMPTS", ATTEMPTS),
         ("LAST_STEPS", shader::LONGEST_BURST),
         ("BINADE", 1 << (f32::MANTISSA_DIGITS - 1)),
         ("NO_STEP", NO_STEP),
-        ("GATE_EGO_WIDTH", LateralGate::EgoWidth as u32),
-        ("GATE_OVERLAP", LateralGate::Overlap as u32),
-        ("BTN_EQUIVALENT_DELAY", BtnForm::EquivalentDelay as u32),
-        ("BTN_EXACT", BtnForm::Exact as u32),
-        ("BTN_DISTANCE_RATIO", BtnForm::DistanceRatio as u32),
-        ("CONTACT_NONE", Contact::None.code()),
-        ("CONTACT_BY_SIDE", Contact::BySide.code()),
-        ("CONTACT_FRONTAL", Contact::Frontal.code()),
-        ("END_CONTACT", EndReason::Contact as u32),
-        ("END_SETTLED", EndReason::Settled as u32),
-        ("END_STANDSTILL", EndReason::Standstill as u32),
-        ("END_CAP", EndReason::Cap as u32),
-        ("END_ABORTED", EndReason::Aborted as u32),
         ("INFINITY_BITS", f32::INFINITY.to_bits()),
         ("UNBOUNDED", f32::MAX.to_bits()),
         // Four verdict bits a lane.
         ("LANES_PER_WORD", u32::BITS / 4),
     ];
     // Numbers of the sine's polynomial in lane arithmetic.
-    let sines = ["SINE_0", "SINE_1", "SINE_2", "SINE_3", "SINE_4", "SINE_5"];
-    let bits = |at: usize| (generated::SINE[at] as f32).to_bits();
-    let expected: Vec<(&str, u32)> =
-        expected.into_iter().chain(sines.into_iter().enumerate().map(|(at, name)| (name, bits(at)))).collect();
+    let sine = generated::SINE.iter().enumerate().map(|(at, of)| (format!("SINE_{at}"), (*of as f32).to_bits()));
+    let expected: Vec<(String, u32)> = [
+        expected.map(|(name, value)| (name.to_owned(), value)).to_vec(),
+        sine.collect(),
+        coded("MOTION_", &MOTIONS, |of| of as u32),
+        coded("GATE_", &[LateralGate::EgoWidth, LateralGate::Overlap], |of| of as u32),
+        coded("BTN_", &[BtnForm::EquivalentDelay, BtnForm::Exact, BtnForm::DistanceRatio], |of| of as u32),
+        coded("CONTACT_", &CONTACTS, Contact::code),
+        coded("END_", &ENDS, |of| of as u32),
+    ]
+    .concat();
     same_constants(&module, &expected);
     // A lane that is not over never writes its end: no reason may have its code.
-    assert!(expected.iter().all(|(name, code)| !name.starts_with("END_") || *code != constant(&module, "END_NOT_YET")));
+    assert!(ENDS.iter().all(|end| *end as u32 != constant(&module, "END_NOT_YET")));
     // No constant without a twin is added unseen.
-    let known: BTreeSet<&str> = expected.iter().map(|(name, _)| *name).collect();
+    let known: BTreeSet<&str> = expected.iter().map(|(name, _)| name.as_str()).collect();
     let alone = ["WORKGROUP", "MODELS", "END_NOT_YET", "MAX_TURNS", "MIN_SKIPPED", "LOOK_AGAIN", "MAX_ADDITIONS"];
     for (_, other) in module.constants.iter() {
         let name = other.name.as_deref().unwrap();
@@ -408,20 +394,9 @@ fn the_host_reads_from_an_outcome_word_what_a_lane_writes_into_it() {
     };
     let settled = constant(&module, "END_SETTLED") << 8;
     let frontal = constant(&module, "CONTACT_FRONTAL") << 4;
-    for (name, contact) in
-        [("CONTACT_NONE", Contact::None), ("CONTACT_BY_SIDE", Contact::BySide), ("CONTACT_FRONTAL", Contact::Frontal)]
-    {
-        assert_eq!(read(constant(&module, name) << 4 | settled).unwrap().contact, contact);
-    }
-    for (name, end) in [
-        ("END_CONTACT", EndReason::Contact),
-        ("END_SETTLED", EndReason::Settled),
-        ("END_STANDSTILL", EndReason::Standstill),
-        ("END_CAP", EndReason::Cap),
-        ("END_ABORTED", EndReason::Aborted),
-    ] {
-        assert_eq!(read(constant(&module, name) << 8 | frontal).unwrap().end, end);
-    }
+    // The codes are those of the shader: `constants_that_stand_on_both_sides_agree`.
+    CONTACTS.iter().for_each(|of| assert_eq!(read(of.code() << 4 | settled).unwrap().contact, *of));
+    ENDS.iter().for_each(|end| assert_eq!(read((*end as u32) << 8 | frontal).unwrap().end, *end));
     assert_eq!(read(constant(&module, "END_NOT_YET") << 8), None);
     assert_eq!(read(3 << 4 | settled), None);
     // What no lane wrote: an end by contact, without one.
@@ -435,23 +410,9 @@ fn the_host_reads_from_an_outcome_word_what_a_lane_writes_into_it() {
     assert_eq!(read(1 << 6 | settled).unwrap().contact_with, 1);
 }
 
-#[test]
-fn a_variable_in_a_loop_that_begins_with_nothing_is_found() {
-    let body = |declared: &str| {
-        format!("fn f() {{\n  for (var k = 0u; k < 9u; k++) {{\n    {declared}\n  }}\n  var y: u32;\n}}")
-    };
-    assert_eq!(uninitialized_in_loops(&body("var x: u32;")), ["var x: u32;"]);
-    assert!(uninitialized_in_loops(&body("var x: u32 = 0u;")).is_empty());
-}
-
-fn in_crate(path: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
-}
-
 /// Functions of the Rust file beside a shader, but for those without a twin.
 fn twin_functions(folder: &str, shader: &str, no_twin: &[&str]) -> Vec<String> {
-    let twin = in_crate(folder).join(shader).with_extension("rs");
-    let text = std::fs::read_to_string(&twin).unwrap_or_else(|e| panic!("{}: {e}", twin.display()));
+    let text = text_of(&format!("{folder}/{}", shader.replace(".wgsl", ".rs")));
     let mut names = function_names(text.split("#[cfg(test)]").next().unwrap());
     names.retain(|name| !no_twin.contains(&name.as_str()));
     names
@@ -507,14 +468,8 @@ fn shader_files() -> impl Iterator<Item = (&'static str, &'static str)> {
 #[test]
 fn every_shader_file_is_part_of_a_pipeline() {
     let known: BTreeSet<String> = shader_files().map(|(name, _)| name.to_owned()).collect();
-    let mut found = BTreeSet::new();
-    for folder in ["", "shared/"] {
-        for entry in std::fs::read_dir(in_crate("shaders").join(folder)).unwrap() {
-            let name = entry.unwrap().file_name().into_string().unwrap();
-            found.extend(name.ends_with(".wgsl").then(|| format!("{folder}{name}")));
-        }
-    }
-    assert_eq!(found, known);
+    let found = names(&in_crate("shaders")).into_iter().filter(|name| name.ends_with(".wgsl"));
+    assert_eq!(found.collect::<BTreeSet<_>>(), known);
 }
 
 #[test]
@@ -541,7 +496,10 @@ fn only_the_entry_has_bindings_and_every_file_stays_short_and_plain() {
 }
 
 #[test]
-fn a_loop_that_counts_up_to_no_constant_is_found() {
+fn a_loop_that_counts_up_to_no_constant_and_a_variable_in_one_that_begins_with_nothing_are_found() {
+    let body = |declared: &str| format!("fn f() {{\n  loop {{\n    {declared}\n  }}\n  var y: u32;\n}}");
+    assert_eq!(uninitialized_in_loops(&body("var x: u32;")), ["var x: u32;"]);
+    assert!(uninitialized_in_loops(&body("var x: u32 = 0u;")).is_empty());
     for (body, counted) in [
         ("for (var k = 0u; k < 9u; k++) { x = x + 1.0; }", true),
         ("for (var k = 0u; k < n; k++) { x = x + 1.0; }", false),

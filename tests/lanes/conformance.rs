@@ -3,14 +3,13 @@
 use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 
-use lanesweep::engine::{Constants, EndReason, LaneCase, NO_STEP, Outcome, Start, Step};
-use lanesweep::model::criterion::Criterion;
-use lanesweep::model::driver::{DriverProfile, ModelId};
-use lanesweep::model::profile::Profile;
+use lanesweep::engine::{Constants, EndReason, LaneCase, NO_STEP, Start, Step};
+use lanesweep::model::driver::DriverProfile;
 use lanesweep::model::scalar::Real;
+use lanesweep::prelude::*;
 use lanesweep::run::grid::jrc_case::{self, Front, NATIVE_THW_S, native_distance_fsm, native_distance_rss};
-use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions, recorded_case};
-use lanesweep::scenario::{Case, Category, Tables, read_scenarios};
+use lanesweep::scenario::parameterization::{ParameterizationOptions, recorded_case};
+use lanesweep::scenario::{Case, Tables};
 
 use crate::common;
 use crate::common::lane_sets::run_lane;
@@ -275,13 +274,6 @@ fn the_script_finds_equal_and_wrong_and_missing_rows() {
     }
 }
 
-struct Encoded {
-    case64: LaneCase<f64>,
-    tables64: Tables<f64>,
-    case32: LaneCase<f32>,
-    tables32: Tables<f32>,
-}
-
 /// Differences of a lane of the `paper` profile from its row.
 fn lane_differences(row: &Row, ours: &Outcome<f64>, dt: f64) -> Vec<String> {
     let collided = ours.contact_step != NO_STEP;
@@ -321,12 +313,13 @@ fn every_lane_of_the_paper_profile_equals_an_independent_implementation_in_f64_a
     let options = ParameterizationOptions { sinusoid_intervals: 200, ..ParameterizationOptions::default() };
     let constants64 = Category::ALL.map(|category| Constants::<f64>::resolve(&profile, category));
     let constants32 = Category::ALL.map(|category| Constants::<f32>::resolve(&profile, category));
+    type Encoded = (LaneCase<f64>, Tables<f64>);
     let mut encoded: HashMap<(&str, &str), Encoded> = HashMap::new();
     let (mut differences, mut ties) = (Vec::new(), Vec::new());
     for row in &rows {
         let (id, key) = (row.text("id"), row.text("param"));
         let scenario = scenarios.iter().find(|scenario| scenario.id == id).unwrap();
-        let lane = encoded.entry((id, key)).or_insert_with(|| {
+        let (case, tables) = encoded.entry((id, key)).or_insert_with(|| {
             let case = match key {
                 "S" => recorded_case(scenario, dt).unwrap(),
                 _ => {
@@ -334,15 +327,12 @@ fn every_lane_of_the_paper_profile_equals_an_independent_implementation_in_f64_a
                     found.case(scenario, dt, &options, None).unwrap()
                 }
             };
-            let mut tables64 = Tables::default();
-            let case64 = LaneCase::encode(&case, &profile, &mut tables64);
-            let (case32, tables32) = (case64.cast(), tables64.cast());
-            Encoded { case64, tables64, case32, tables32 }
+            let mut tables = Tables::default();
+            (LaneCase::encode(&case, &profile, &mut tables), tables)
         });
-        let (driven, thw, exact) =
-            ((row.model(), scenario.category), row.number("thw"), (&lane.case64, &lane.tables64));
+        let (driven, thw, exact) = ((row.model(), scenario.category), row.number("thw"), (&*case, &*tables));
         let in_f64 = run(&constants64, driven, exact, Start::Headway(thw));
-        let in_f32 = run(&constants32, driven, (&lane.case32, &lane.tables32), Start::Headway(f32::from_f64(thw)));
+        let in_f32 = run(&constants32, driven, (&case.cast(), &tables.cast()), Start::Headway(f32::from_f64(thw)));
         if in_f64.verdicts != in_f32.verdicts {
             differences.push(format!("{}: the verdicts in f32 differ", row.place));
         }
@@ -352,8 +342,7 @@ fn every_lane_of_the_paper_profile_equals_an_independent_implementation_in_f64_a
         let found = lane_differences(row, &in_f64, dt);
         // The table's flag moves the gap but compares verdicts only. If a change of 1e-9 m gives the table's values,
         // rounding decides.
-        let nudged =
-            |nudge_m: &f64| run(&constants64, driven, exact, Start::Gap(thw * lane.case64.ego_speed + nudge_m));
+        let nudged = |nudge_m: &f64| run(&constants64, driven, exact, Start::Gap(thw * case.ego_speed + nudge_m));
         let is_tie = || [1e-9, -1e-9].iter().any(|nudge_m| lane_differences(row, &nudged(nudge_m), dt).is_empty());
         if !found.is_empty() && is_tie() {
             ties.push(&row.place);

@@ -1,12 +1,9 @@
 //! Twenty cases of a type-approval kind, calculated by hand and compared with what `lanesweep check` says at a time step of
 //! 0.001 s; the verdicts are the same with the profile's own step, whose numbers the book prints.
 
-use lanesweep::engine::Headway;
-use lanesweep::model::criterion::Criterion;
-use lanesweep::model::driver::{BelowTrigger, CutInBraking, ModelId};
-use lanesweep::model::profile::Profile;
-use lanesweep::run::check::{Answer, Check, Demand, Holds, Judged, Judgement, Reading, RunEnd, Subject, Verdict};
-use lanesweep::scenario::{Category, PlainCase};
+use lanesweep::model::driver::{BelowTrigger, CutInBraking};
+use lanesweep::prelude::*;
+use lanesweep::run::check::{Answer, Demand, Holds, Judged, Judgement, Reading, RunEnd, Verdict};
 use lanesweep::stats::random::philox4x32_10;
 
 const KMH: f64 = 1.0 / 3.6;
@@ -133,7 +130,7 @@ fn cases_1_to_3_a_leader_that_brakes_at_6_is_seen_after_0_4_s_and_answered_after
 }
 
 #[test]
-fn cases_4_and_6_a_cut_in_with_1_3_s_at_lane_intrusion_has_to_be_avoided_and_is() {
+fn cases_4_to_6_a_cut_in_with_1_3_s_at_lane_intrusion_has_to_be_avoided_and_is() {
     // Lane intrusion: 0.5 m of lateral gap, centre at 2.4 m, after 1.1 m or 1.1 s. Closing at 8.333 m/s.
     let judgement = judged(&cut_in(V / 2.0), Headway::GapM(20.0));
     let closing = V / 2.0;
@@ -151,12 +148,8 @@ fn cases_4_and_6_a_cut_in_with_1_3_s_at_lane_intrusion_has_to_be_avoided_and_is(
     let perceived = reading(&judgement, "TTC when perceived");
     near(perceived.value.unwrap(), 20.0 / closing - 0.775, 0.003);
     assert!(perceived.holds() == Holds::Yes);
-}
-
-#[test]
-fn case_5_a_cut_in_with_0_94_s_is_not_demanded_and_6_mps2_hit_at_3_2_mps() {
+    // Case 5: with 0.94 s it is not demanded, and 6 m/s² hit at 3.2 m/s.
     let judgement = judged(&cut_in(V / 2.0), Headway::GapM(17.0));
-    let closing = V / 2.0;
     let at_intrusion_m = 17.0 - 1.1 * closing;
     assert_eq!(judgement.demand(), Some(Demand::Nothing));
     // After 0.35 s 4.92 m are left; braking at 6 m/s² takes 59 of the 69.4 m²/s².
@@ -190,12 +183,17 @@ fn case_8_a_cut_out_at_130_kmh_41_8_m_before_a_stationary_vehicle_is_not_prevent
 }
 
 #[test]
-fn case_9_a_faster_vehicle_that_cuts_in_is_no_danger() {
+fn case_9_a_faster_vehicle_that_cuts_in_is_no_danger_nor_one_as_fast_that_does_not_brake() {
     let judgement = judged(&case(Category::CutIn, V, 70.0 * KMH), Headway::GapM(5.0));
     assert!(is(&judgement, Answer::NoConflict) && judgement.models.iter().all(|judged| !judged.collides()));
     assert_eq!(judgement.demand(), Some(Demand::Nothing), "(a): it is not slower");
     assert!(of(&judgement, ModelId::Cchdm).reaction_s().is_none());
     assert!(of(&judgement, ModelId::Cchdm).trace.outcome.min_ttc.is_infinite());
+    // A cutter at the ego's speed leaves nothing to prevent; where it brakes there is something.
+    assert!(is(&judged(&case(Category::CutIn, V, V), Headway::GapM(12.0)), Answer::NoConflict));
+    let braking = PlainCase { acceleration_mps2: -3.0, ..case(Category::CutIn, V, V) };
+    let judgement = judged(&braking, Headway::GapM(20.0));
+    assert!(judgement.verdicts.unreacting == RunEnd::Contact && !is(&judgement, Answer::NoConflict));
 }
 
 #[test]
@@ -260,7 +258,7 @@ fn every_value_of_the_clauses_is_that_of_its_own_time() {
 /// 60 behind 45 km/h at 7.53 m: lane intrusion at 1.1 s leaves 7.53/4.1667 - 1.1 = 0.707 s, more than 0.697 s. At 1.12 s, the
 /// next step, it would be 0.687 s.
 #[test]
-fn lane_intrusion_is_not_rounded_to_a_step_and_a_demand_at_its_threshold_is_not_robust() {
+fn lane_intrusion_follows_from_widths_between_steps_and_a_demand_at_its_threshold_is_not_robust() {
     let judgement = judged(&case(Category::CutIn, V, 45.0 * KMH), Headway::GapM(7.53));
     let ttc = reading(&judgement, "(c)");
     near(ttc.value.unwrap(), 7.53 / (15.0 * KMH) - 1.1, 1e-6);
@@ -270,12 +268,8 @@ fn lane_intrusion_is_not_rounded_to_a_step_and_a_demand_at_its_threshold_is_not_
     let threshold_m = (ttc.threshold + 1.1) * 15.0 * KMH;
     let at = |gap_m| judged(&case(Category::CutIn, V, 45.0 * KMH), Headway::GapM(gap_m)).demand_flips;
     assert!(at(threshold_m + 0.005).contains(&"gap - 1 cm") && at(threshold_m + 1.0).is_empty());
-}
-
-/// The near edge of a cutter is 0.3 m beyond the marking earlier if it is wide, and later in a narrow lane; the ego's width
-/// has no part in it.
-#[test]
-fn lane_intrusion_follows_from_the_width_of_lane_and_cutter() {
+    // The near edge of a cutter is 0.3 m beyond the marking earlier if it is wide, and later in a narrow lane; the ego's width
+    // has no part in it.
     let plain = case(Category::CutIn, V, 40.0 * KMH);
     for (case, visible_s) in [
         (PlainCase { width_m: 2.5, ..plain }, 0.8),
@@ -300,15 +294,6 @@ fn braking_on_a_gap_that_opened_begins_a_delay_after_the_reaction() {
         }
         assert!(of(&judgement, ModelId::Cchdm).collides());
     }
-}
-
-/// A cutter at the ego's speed leaves nothing to prevent; where it brakes there is something.
-#[test]
-fn without_a_collision_of_an_ego_that_never_reacts_there_is_no_conflict() {
-    assert!(is(&judged(&case(Category::CutIn, V, V), Headway::GapM(12.0)), Answer::NoConflict));
-    let braking = PlainCase { acceleration_mps2: -3.0, ..case(Category::CutIn, V, V) };
-    let judgement = judged(&braking, Headway::GapM(20.0));
-    assert!(judgement.verdicts.unreacting == RunEnd::Contact && !is(&judgement, Answer::NoConflict));
 }
 
 /// Gap that CCHDM needs from its reaction until it is no faster than a vehicle of constant speed: as to a standstill, at the
@@ -381,7 +366,7 @@ fn cases_13_and_14_a_gap_typed_to_the_centimetre_is_the_annex_headway_of_2_s() {
 /// EU 2022/1426, Annex III part 1, 1.4.2: the twelve values that the KBA publishes, TTC at lane intrusion, s, for relative
 /// speeds of 10 to 60 km/h.
 #[test]
-fn case_15_the_demand_of_eu_2022_1426_begins_at_the_published_times() {
+fn cases_15_and_16_the_demand_of_eu_2022_1426_begins_at_the_published_times_before_that_of_r157() {
     for (name, published_s) in [
         ("eu-2022-1426", [0.48, 0.71, 0.94, 1.18, 1.41, 1.64]),
         ("eu-2022-1426-standing", [0.74, 1.32, 1.90, 2.47, 3.05, 3.63]),
@@ -395,22 +380,15 @@ fn case_15_the_demand_of_eu_2022_1426_begins_at_the_published_times() {
                 under(profile.clone(), &case(Category::CutIn, 100.0 * KMH, 100.0 * KMH - closing), Headway::GapM(gap_m))
             };
             let (above, below) = (with_ttc(published_s + 0.011), with_ttc(published_s - 0.011));
-            assert_eq!(
-                (above.demand(), below.demand()),
-                (Some(Demand::Avoid), Some(Demand::Nothing)),
-                "{name}, {kmh} km/h"
-            );
+            let demands = (above.demand(), below.demand());
+            assert_eq!(demands, (Some(Demand::Avoid), Some(Demand::Nothing)), "{name}, {kmh} km/h");
             near(reading(&above, "(c)").threshold, published_s, 0.01);
             assert!(above.clause.starts_with("EU 2022/1426"));
             assert!(!above.readings.iter().any(|reading| reading.quantity.starts_with("(b)")));
         }
     }
-}
-
-/// 50 behind 20 km/h: at lane intrusion 0.95 s, between the thresholds of the EU's regulation (8.333/12 + 0.25 = 0.944 s)
-/// and of R157 (1.044 s).
-#[test]
-fn case_16_the_eu_demands_what_r157_does_not() {
+    // Case 16, 50 behind 20 km/h: at lane intrusion 0.95 s, between the thresholds of the EU's regulation
+    // (8.333/12 + 0.25 = 0.944 s) and of R157 (1.044 s).
     let closing = 30.0 * KMH;
     let cut_in = case(Category::CutIn, 50.0 * KMH, 20.0 * KMH);
     let gap = Headway::GapM((1.1 + 1.0) * closing);

@@ -1,12 +1,12 @@
 //! Values without a verdict: smallest THW, largest DRAC, TET, TIT, and the PET of a cut-in.
 
-use lanesweep::engine::{Constants, LaneRunner, Outcome, Start, Step};
+use lanesweep::engine::{Constants, LaneRunner, Start, Step};
 use lanesweep::model::criterion::BtnContact;
-use lanesweep::model::driver::ModelId;
-use lanesweep::model::profile::Profile;
 use lanesweep::model::scalar::Real;
-use lanesweep::scenario::{Case, Category, Lateral, Speed};
+use lanesweep::prelude::*;
+use lanesweep::scenario::{Case, Lateral, Speed};
 
+use crate::common;
 use crate::common::lane_sets::{random, run_case, run_lane};
 use crate::common::plans::beside;
 
@@ -132,10 +132,8 @@ fn every_value_is_that_of_its_definition_and_keeps_its_bounds() {
             let (model, start) = (plan.models[key.model], plan.headways[key.headway].start());
             let found = run_lane(&constants[key.block], model, (&case, plan.tables()), start, &mut see);
             let what = plan.key_text(&key);
-            let same = |value: f64, expected: f64| {
-                let is_near = value == expected || (value - expected).abs() <= 1e-9 * (1.0 + expected.abs());
-                assert!(is_near, "{what}: {value} is not {expected}");
-            };
+            let same =
+                |value, expected| assert!(common::near(value, expected, 1e-9), "{what}: {value} is not {expected}");
             same(found.min_thw, defined.min_thw.unwrap_or(f64::INFINITY));
             same(found.max_drac, defined.max_drac);
             let below: Vec<f64> = defined.ttc_s.iter().copied().filter(|ttc_s| *ttc_s < threshold_s).collect();

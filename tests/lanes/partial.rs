@@ -3,9 +3,8 @@
 use crate::common::dice::cases;
 use crate::common::plans::{self, chunk, mixed, plan};
 use lanesweep::engine::{Chunk, LanePlan, Partial, Verdicts};
-use lanesweep::model::criterion::Criterion;
+use lanesweep::prelude::*;
 use lanesweep::run::parts::seal;
-use lanesweep::scenario::Category;
 
 fn study() -> LanePlan {
     plan(&[(Category::CutIn, 4, &["1", "2"]), (Category::CutOut, 0, &["a"]), (Category::Lvd, 5, &["i"])])

@@ -2,17 +2,15 @@
 
 use sha2::{Digest, Sha256};
 
-use crate::common::lane_sets::run_lane;
+use crate::common::lane_sets::{run_lane, swept};
 
-use lanesweep::engine::ENGINE_VERSION;
 use lanesweep::engine::verify::{SetOptions, random_plan, threshold_plan};
-use lanesweep::engine::{Backend, Constants, CpuBackend, Headway, LanePlan, Outcome, Start, Wanted, words};
-use lanesweep::model::driver::ModelId;
-use lanesweep::model::profile::Profile;
+use lanesweep::engine::{Backend, Constants, ENGINE_VERSION, LanePlan, Start, words};
+use lanesweep::prelude::*;
 use lanesweep::run::sampling::{SAMPLE_PURPOSE, generator_of};
-use lanesweep::run::study::{StudyOptions, plan_of_parts};
-use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions, Reduction, Sizes, SvdBasis};
-use lanesweep::scenario::{Category, Scenario, Tables};
+use lanesweep::run::study::plan_of_parts;
+use lanesweep::scenario::Tables;
+use lanesweep::scenario::parameterization::{ParameterizationOptions, Reduction, Sizes, SvdBasis};
 use lanesweep::stats::density::{Bandwidth, BandwidthRule, Kde, ParameterSpace, SearchEnd};
 use lanesweep::stats::random::Stream;
 use lanesweep::support::plain_text::hex;
@@ -93,8 +91,7 @@ fn lanes(digests: &mut [Sha256; 2], plan: &LanePlan) -> usize {
     let (narrow, wide) = (CpuBackend::scalar(), CpuBackend::reference());
     let backends: [&dyn Backend; 2] = [&narrow, &wide];
     for backend in backends {
-        let chunk = backend.prepare(plan).unwrap().run(0..plan.unit_count(), Wanted::Outcomes).unwrap();
-        chunk.outcomes.iter().for_each(|outcome| add(digests, outcome));
+        swept(plan, backend, Wanted::Outcomes).outcomes.iter().for_each(|outcome| add(digests, outcome));
     }
     plan.lane_count() as usize
 }
@@ -143,10 +140,9 @@ fn the_bits_of_lanes_are_those_of_the_engine_version() {
     for name in Profile::names() {
         for dt_s in [0.04, 0.1] {
             let profile = Profile::load(name).unwrap().with_dt(dt_s).unwrap();
-            let random = SetOptions { size: 80, models: models(), ..SetOptions::default() };
-            count += lanes(&mut digests, &random_plan(&profile, &random).unwrap());
-            let thresholds = SetOptions { size: 1, models: models(), ..SetOptions::default() };
-            count += lanes(&mut digests, &threshold_plan(&profile, &thresholds).unwrap());
+            let of = |size| SetOptions { size, models: models(), ..SetOptions::default() };
+            count += lanes(&mut digests, &random_plan(&profile, &of(80)).unwrap());
+            count += lanes(&mut digests, &threshold_plan(&profile, &of(1)).unwrap());
             count += lanes(&mut digests, &study(&profile));
             if name != "jrc-2021" {
                 samples(&mut digests, &profile);

@@ -1,20 +1,18 @@
 //! Cases made where lanes run: they mean what the host's cases mean, and every backend makes the same bits of them.
 
 use crate::common;
+use crate::common::lane_sets::swept_on_cpu;
 use crate::common::mined::{density_of, provenance, scenarios_of};
 
-use lanesweep::engine::{Backend, CpuBackend, Headway, Instructions, LaneCase, LanePlan, Wanted, words};
-use lanesweep::model::criterion::Criterion;
-use lanesweep::model::driver::{MODELS, ModelId};
-use lanesweep::model::profile::Profile;
+use lanesweep::engine::{Backend, Instructions, LaneCase, LanePlan, words};
+use lanesweep::model::driver::MODELS;
+use lanesweep::prelude::*;
 use lanesweep::run::sampling::{
-    Estimator, SAMPLE_PURPOSE, SampleHeadways, SampleOptions, generator_of, generator_of_points, plan_points,
-    plan_samples,
+    Estimator, SAMPLE_PURPOSE, generator_of, generator_of_points, plan_points, plan_samples,
 };
-use lanesweep::run::study::{StudyOptions, plan_study};
-use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions};
-use lanesweep::scenario::{Category, Tables};
-use lanesweep::stats::density::{DensityModel, FitOptions};
+use lanesweep::run::study::plan_study;
+use lanesweep::scenario::Tables;
+use lanesweep::scenario::parameterization::ParameterizationOptions;
 use lanesweep::stats::random::Stream;
 
 fn density(category: Category, key: &str, with_thw: bool) -> DensityModel {
@@ -128,8 +126,7 @@ fn samples_are_the_same_whatever_the_chunks_threads_and_instructions() {
             let backend = CpuBackend::with_instructions(instructions).unwrap();
             assert!(whole == outcomes(&plan, &backend, &[0, n / 2, n]), "{id:?} {instructions}");
         }
-        let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-        let alone = one.install(|| outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]));
+        let alone = common::with_threads(1, || outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]));
         assert!(whole == alone, "{id:?}: threads matter");
     }
 }
@@ -166,12 +163,7 @@ fn a_device_makes_the_same_lanes_of_the_same_samples_and_draws_headways_and_give
         let given = plan_points(&density, points, &profile, &ModelId::ALL, &SampleHeadways::Sampled).unwrap();
         assert_alike(&format!("{key} given"), &given, &*device);
     }
-}
-
-#[test]
-fn a_device_refuses_the_draws_that_the_host_refuses() {
-    let Some(device) = common::device::software_backend() else { return };
-    let profile = Profile::load("paper").unwrap();
+    // It refuses the draws that the host refuses.
     for (category, key) in [(Category::CutIn, "7"), (Category::CutOut, "e"), (Category::CutOut, "g")] {
         // Left and right in one decomposition: many draws are in the wrong lane.
         let parameterization = ParameterizationOptions::default();
@@ -210,10 +202,9 @@ fn indices_beyond_32_bits_are_samples_of_their_own() {
 /// Failures of samples, and of the scenarios that they come from, at finer and coarser steps: none vanish.
 #[test]
 fn failures_of_samples_and_studies_vary_smoothly_with_the_time_step() {
-    let backend = CpuBackend::lane_arithmetic();
     let failures = |plan: &LanePlan| -> Vec<f64> {
         let mut counts = vec![[0_u64; 3]; plan.models.len()];
-        let chunk = backend.prepare(plan).unwrap().run(0..plan.unit_count(), Wanted::Verdicts).unwrap();
+        let chunk = swept_on_cpu(plan, Wanted::Verdicts);
         for (lane, verdict) in chunk.verdicts.iter().enumerate() {
             let of_model = &mut counts[lane % plan.models.len()];
             for criterion in Criterion::ALL {

@@ -1,16 +1,10 @@
-//! What the score says about chosen verdicts, and that threads and chunks do not change a bit of it.
+//! What the score says about chosen verdicts, and that threads do not change a bit of it (nor chunks: `partial.rs`).
 
-use crate::common;
-use crate::common::plans;
-
-use crate::common::plans::{chunk, mixed, plan};
+use crate::common::plans::{self, chunk, mixed, plan};
+use crate::common::{golden_json, with_threads};
 use lanesweep::engine::{Confusion, LaneKey, LanePlan, Partial, Verdicts};
-use lanesweep::model::criterion::Criterion;
-use lanesweep::model::driver::ModelId;
-use lanesweep::run::score::{
-    ClaimVerdict, ScoreOptions, ScoreTable, best_parameterizations, check_claims, f1, precision, recall, score,
-};
-use lanesweep::scenario::Category;
+use lanesweep::prelude::*;
+use lanesweep::run::score::{ClaimVerdict, ScoreTable, best_parameterizations, check_claims, score};
 
 const LVD: &[&str] = &["i", "ii", "iii", "iv", "v"];
 
@@ -18,8 +12,10 @@ fn part(plan: &LanePlan, units: std::ops::Range<u64>, lane: &dyn Fn(u64) -> Verd
     Partial::from_chunk(plan, &chunk(plan, units, &|l| (lane(l), 1.0), false)).unwrap()
 }
 
-fn table(plan: &LanePlan, lane: &dyn Fn(u64) -> Verdicts) -> ScoreTable {
-    score(plan, &part(plan, 0..plan.unit_count(), lane), &ScoreOptions::default()).unwrap()
+fn scored(plan: &LanePlan, lane: &dyn Fn(u64) -> Verdicts) -> (Partial, ScoreTable) {
+    let counts = part(plan, 0..plan.unit_count(), lane);
+    let table = score(plan, &counts, &ScoreOptions::default()).unwrap();
+    (counts, table)
 }
 
 /// S fails at random; each variant repeats S but for a share (per mille) of lanes, where it is turned round.
@@ -57,8 +53,7 @@ fn claims_are_judged_by_scenarios_and_need_enough_of_them() {
             let fails = key.unit < failing[key.model] && key.variant != 3 && !(is_d_bad && key.variant == 4);
             Verdicts(if fails { 0b111 } else { 0 })
         };
-        let counts = part(&plan, 0..400, &lane);
-        let table = score(&plan, &counts, &ScoreOptions::default()).unwrap();
+        let (counts, table) = scored(&plan, &lane);
         check_claims(&table, &plan, &counts).into_iter().find(|of| of.claim.id == id).unwrap().verdict
     };
     for (id, failing, is_d_bad, expected) in [
@@ -78,7 +73,7 @@ fn claims_are_judged_by_scenarios_and_need_enough_of_them() {
 fn the_interval_covers_the_value_and_shrinks_with_the_number_of_scenarios() {
     let width = |units| {
         let plan = plan(&[(Category::Lvd, units, LVD)]);
-        let table = table(&plan, &noisy(&plan, &[100, 100, 100, 100, 100]));
+        let (_, table) = scored(&plan, &noisy(&plan, &[100, 100, 100, 100, 100]));
         let scores = &table.categories[0];
         let cell = &scores.cells[scores.index(2, ModelId::Rss, Criterion::Btn).unwrap()];
         let (value, interval) = (f1(&cell.counts).unwrap(), cell.f1_interval.unwrap());
@@ -98,8 +93,7 @@ fn the_best_of_equals_is_the_first_and_no_data_tells_it_from_the_others() {
         let variant = key.variant.min(3);
         noisy(&plan, &[400, 400, 50, 50, 50])(plan.lane(&LaneKey { variant, ..key }))
     };
-    let counts = part(&plan, 0..60, &twins);
-    let table = score(&plan, &counts, &ScoreOptions::default()).unwrap();
+    let (counts, table) = scored(&plan, &twins);
     for best in best_parameterizations(&table, &plan, &counts, Criterion::Ttc) {
         assert_eq!(best.data_for_decision, None, "no data does");
         let score = best.score.unwrap();
@@ -113,8 +107,7 @@ fn a_best_parameterization_needs_ten_failing_scenarios() {
     let plan = plan(&[(Category::Lvd, 60, LVD)]);
     let best = |failing: u64| {
         let lane = |lane: u64| Verdicts(if plan.key(lane).unwrap().unit < failing { 7 } else { 0 });
-        let counts = part(&plan, 0..60, &lane);
-        let table = score(&plan, &counts, &ScoreOptions::default()).unwrap();
+        let (counts, table) = scored(&plan, &lane);
         assert!(failing > 0 || table.categories[0].cells[0].f1_interval.is_none(), "an interval of nothing");
         let best = best_parameterizations(&table, &plan, &counts, Criterion::Collision).swap_remove(0);
         (best.failures, best.failing_scenarios, best.score.is_some(), best.data_for_decision)
@@ -125,20 +118,12 @@ fn a_best_parameterization_needs_ten_failing_scenarios() {
 }
 
 #[test]
-fn threads_and_chunks_do_not_change_a_bit() {
+fn threads_do_not_change_a_bit() {
     let plan = plan(&[(Category::CutIn, 20, &["1", "2"]), (Category::Lvd, 15, LVD)]);
     let lane = noisy(&plan, &[100, 200, 300, 50, 10]);
-    let whole = part(&plan, 0..35, &lane);
-    let parts = part(&plan, 21..35, &lane).merge(part(&plan, 0..3, &lane)).unwrap();
-    let parts = parts.merge(part(&plan, 3..21, &lane)).unwrap();
-    assert_eq!(whole, parts);
-    let with_threads = |threads: usize, partial: &Partial| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| score(&plan, partial, &ScoreOptions::default()).unwrap())
-    };
-    let (one, two) = (with_threads(1, &whole), with_threads(2, &parts));
-    assert_eq!(one, two);
-    assert_eq!(check_claims(&one, &plan, &whole), check_claims(&two, &plan, &parts));
+    let counts = part(&plan, 0..35, &lane);
+    let of = || score(&plan, &counts, &ScoreOptions::default()).unwrap();
+    assert_eq!(with_threads(1, of), with_threads(2, of));
 }
 
 #[test]
@@ -154,9 +139,7 @@ fn an_incomplete_or_foreign_sweep_is_not_scored() {
 
 #[test]
 fn the_papers_lvd_f1_follow_from_their_integer_counts() {
-    let golden = std::fs::read_to_string(common::golden("paper_lvd_f1.json")).unwrap();
-    let golden: serde_json::Value = serde_json::from_str(&golden).unwrap();
-    let mut checked = 0;
+    let (golden, mut checked) = (golden_json("paper_lvd_f1.json"), 0);
     for cell in golden["lvd"].as_object().unwrap().values().flat_map(|v| v.as_object().unwrap()) {
         let (name, cell) = cell;
         let expected = cell["F1"].as_f64().unwrap();
@@ -175,7 +158,7 @@ fn the_papers_lvd_f1_follow_from_their_integer_counts() {
 fn a_plan_without_variants_or_with_one_scenario_scores_without_a_panic() {
     for blocks in [&[(Category::Lvd, 1, LVD)][..], &[(Category::CutIn, 1, &[])], &[(Category::Lvd, 0, LVD)]] {
         let plan = plan(blocks);
-        let counts = part(&plan, 0..plan.unit_count(), &|lane| Verdicts((lane % 8) as u8));
-        check_claims(&score(&plan, &counts, &ScoreOptions::default()).unwrap(), &plan, &counts);
+        let (counts, table) = scored(&plan, &|lane| Verdicts((lane % 8) as u8));
+        check_claims(&table, &plan, &counts);
     }
 }

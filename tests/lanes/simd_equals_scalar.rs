@@ -1,15 +1,11 @@
 //! Lanes in batches give the bits of lanes one by one, on every instruction set of this machine, however they are cut.
 
-use crate::common::lane_sets::{forms, random, small_study, thresholds};
+use crate::common::lane_sets::{self, assert_same_in_calls, forms, random, small_study, swept, thresholds};
 use crate::common::mined::scenarios_of;
-use lanesweep::engine::verify::{Comparison, compare};
-use lanesweep::engine::{
-    Backend, CpuBackend, Headway, Instructions, LanePlan, LaneRunner, Outcome, Verdicts, Wanted, same_words,
-};
-use lanesweep::model::driver::ModelId;
-use lanesweep::model::profile::Profile;
-use lanesweep::run::study::{StudyOptions, plan_study};
-use lanesweep::scenario::{Category, Scenario};
+use crate::common::with_threads;
+use lanesweep::engine::{Backend, Instructions, LanePlan};
+use lanesweep::prelude::*;
+use lanesweep::run::study::plan_study;
 
 /// Batches on every instruction set of this machine.
 fn in_batches() -> Vec<CpuBackend> {
@@ -17,13 +13,9 @@ fn in_batches() -> Vec<CpuBackend> {
     sets.map(|set| CpuBackend::with_instructions(set).unwrap()).collect()
 }
 
-/// Outcomes, verdicts and counts of every instruction set against the scalar lanes.
 fn assert_equal(what: &str, plan: &LanePlan) {
-    for backend in in_batches() {
-        let Comparison { worst, modes_differing, .. } = &compare(what, plan, &backend, |_| ()).unwrap();
-        let worst: Vec<String> = worst.iter().map(|l| format!("{} {:?}", l.key, l.names())).collect();
-        assert!(worst.is_empty() && *modes_differing == 0, "{what}, {}: {worst:#?}", backend.describe());
-    }
+    let scalar = swept(plan, &CpuBackend::scalar(), Wanted::Outcomes).outcomes;
+    in_batches().iter().for_each(|backend| assert_same_in_calls(plan, backend, plan.unit_count(), &scalar, what));
 }
 
 #[test]
@@ -78,35 +70,16 @@ fn any_number_of_headways_gives_the_same_words() {
 #[test]
 fn neither_threads_nor_calls_change_a_word() {
     let plan = random(&Profile::load("paper").unwrap(), 800);
-    let runner = LaneRunner::<f32>::new(&plan);
-    let scalar: Vec<Outcome<f64>> =
-        (0..plan.lane_count()).map(|lane| runner.run(&plan.key(lane).unwrap()).widen()).collect();
-    let scalar_verdicts: Vec<Verdicts> = scalar.iter().map(|o| o.verdicts).collect();
+    let scalar = swept(&plan, &CpuBackend::scalar(), Wanted::Outcomes).outcomes;
     for threads in [1, 2, 3] {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         // Sizes that fill no batch, and all at once.
         for units in [1, 7, plan.unit_count()] {
             for backend in in_batches() {
-                let (outcomes, verdicts) = pool.install(|| in_calls(&plan, &backend, units));
-                let what = format!("{threads} threads, {units} units, {}", backend.describe());
-                assert!(outcomes.iter().zip(&scalar).all(|(a, b)| same_words(a, b)), "{what}");
-                assert!(outcomes.len() == scalar.len() && verdicts == scalar_verdicts, "{what}");
+                let what = format!("{threads} threads, {units} units");
+                with_threads(threads, || assert_same_in_calls(&plan, &backend, units, &scalar, &what));
             }
         }
     }
-}
-
-/// So many units at a time: outcomes and, asked for separately, verdicts.
-fn in_calls(plan: &LanePlan, backend: &CpuBackend, units: u64) -> (Vec<Outcome<f64>>, Vec<Verdicts>) {
-    let mut session = backend.prepare(plan).unwrap();
-    let (mut from, mut outcomes, mut verdicts) = (0, Vec::new(), Vec::new());
-    while from < plan.unit_count() {
-        let to = (from + units).min(plan.unit_count());
-        outcomes.extend(session.run(from..to, Wanted::Outcomes).unwrap().outcomes);
-        verdicts.extend(session.run(from..to, Wanted::Verdicts).unwrap().verdicts);
-        from = to;
-    }
-    (outcomes, verdicts)
 }
 
 /// Minutes: `cargo test --release --test library simd_equals_scalar:: -- --ignored`.
@@ -115,5 +88,5 @@ fn in_calls(plan: &LanePlan, backend: &CpuBackend, units: u64) -> (Vec<Outcome<f
 fn a_million_random_lanes_per_model_and_category_are_equal() {
     let plan = random(&Profile::load("paper").unwrap(), 1_000_000);
     assert!(plan.lane_count() >= 1_000_000 * (ModelId::ALL.len() * Category::ALL.len()) as u64);
-    assert_equal("a million", &plan);
+    in_batches().iter().for_each(|backend| lane_sets::assert_equal("a million", &plan, backend));
 }

@@ -2,34 +2,25 @@
 
 use std::collections::{BTreeMap, HashSet};
 
-use crate::common::lane_sets::run_lane;
-use lanesweep::engine::verify::{SetOptions, Threshold, random_plan, threshold_plan};
-use lanesweep::engine::{Backend, Constants, CpuBackend, EndReason, LaneCase, LanePlan, Outcome, Step, Wanted};
-use lanesweep::model::criterion::Criterion;
-use lanesweep::model::driver::{ModelId, View};
-use lanesweep::model::profile::Profile;
-use lanesweep::scenario::{Category, LATERAL_SAMPLED, SPEED_SAMPLED};
+use crate::common::lane_sets::{self, run_lane, swept_on_cpu};
+use lanesweep::engine::verify::{SetOptions, Threshold, random_plan};
+use lanesweep::engine::{Constants, EndReason, LaneCase, LanePlan, Step};
+use lanesweep::model::driver::View;
+use lanesweep::prelude::*;
+use lanesweep::scenario::{LATERAL_SAMPLED, SPEED_SAMPLED};
 
-fn options(seed: u64, size: u64) -> SetOptions {
-    SetOptions { seed, size, ..SetOptions::default() }
+fn random(name: &str, lanes: u64) -> LanePlan {
+    lane_sets::random(&Profile::load(name).unwrap(), lanes)
 }
 
-fn random(name: &str, seed: u64, lanes: u64) -> LanePlan {
-    random_plan(&Profile::load(name).unwrap(), &options(seed, lanes)).unwrap()
-}
-
-fn thresholds(name: &str, seed: u64, units_per_threshold: u64) -> LanePlan {
-    threshold_plan(&Profile::load(name).unwrap(), &options(seed, units_per_threshold)).unwrap()
-}
-
-fn outcomes(plan: &LanePlan) -> Vec<Outcome<f64>> {
-    let mut session = CpuBackend::lane_arithmetic().prepare(plan).unwrap();
-    session.run(0..plan.unit_count(), Wanted::Outcomes).unwrap().outcomes
+fn thresholds(name: &str, units_per_threshold: u64) -> LanePlan {
+    lane_sets::thresholds(&Profile::load(name).unwrap(), units_per_threshold)
 }
 
 #[test]
 fn the_key_of_a_random_lane_says_how_to_make_it_again() {
-    let plan = random("paper", 42, 400);
+    let options = SetOptions { seed: 42, size: 400, ..SetOptions::default() };
+    let plan = random_plan(&Profile::load("paper").unwrap(), &options).unwrap();
     assert_eq!(plan.blocks[1].units.name(9), "random-cut-out-seed42-0000009");
     let lane = plan.first_lane_of(plan.blocks[1].first_unit + 9) + 77;
     let text = plan.key_text(&plan.key(lane).unwrap());
@@ -38,7 +29,7 @@ fn the_key_of_a_random_lane_says_how_to_make_it_again() {
 
 #[test]
 fn both_sets_hold_every_kind_of_motion_alone_and_in_pairs_in_each_category() {
-    for plan in [random("paper", 157, 4000), random("jrc-2021", 157, 4000), thresholds("paper", 157, 12)] {
+    for plan in [random("paper", 4000), random("jrc-2021", 4000), thresholds("paper", 12)] {
         for (at, block) in plan.blocks.iter().enumerate() {
             let seen: HashSet<(u32, u32)> = (0..block.units.len())
                 .flat_map(|unit| (0..block.variants.len()).map(move |variant| (unit, variant)))
@@ -58,8 +49,8 @@ fn both_sets_hold_every_kind_of_motion_alone_and_in_pairs_in_each_category() {
 #[test]
 fn every_criterion_fails_and_passes_often_for_every_model_in_every_category() {
     for name in ["paper", "jrc-2021", "un-r157"] {
-        let plan = random(name, 157, 4000);
-        let outcomes = outcomes(&plan);
+        let plan = random(name, 4000);
+        let outcomes = swept_on_cpu(&plan, Wanted::Outcomes).outcomes;
         let (mut failed, mut lanes, mut steps, mut capped) = (BTreeMap::new(), BTreeMap::new(), 0.0, 0);
         for (lane, outcome) in outcomes.iter().enumerate() {
             let key = plan.key(lane as u64).unwrap();
@@ -169,7 +160,7 @@ const UNITS: u64 = 24;
 #[test]
 fn lanes_sit_exactly_on_each_threshold_with_a_neighbour_on_either_side() {
     for name in ["paper", "jrc-2021", "un-r157"] {
-        let plan = thresholds(name, 157, UNITS);
+        let plan = thresholds(name, UNITS);
         for block in 0..plan.blocks.len() {
             for threshold in Threshold::ALL {
                 let (mut on, mut between, mut in_time) = (0, 0, false);

@@ -11,14 +11,16 @@ use crate::common::small;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{LazyLock, Mutex};
 use std::time::{Duration, Instant};
 
 use crate::common::dice::Dice;
 use mutate::mutated;
 use readers::Reader;
 use seeds::Seeds;
+
+static SEEDS: LazyLock<Seeds> = LazyLock::new(Seeds::make);
 
 const QUICK: u64 = 1600;
 const LONGEST: Duration = Duration::from_secs(5);
@@ -115,8 +117,8 @@ fn run_all(first: u64, inputs: u64, readers: &[Reader], seeds: &Seeds) -> (Vec<[
 
 #[test]
 fn no_input_panics_or_takes_the_memory_or_hangs() {
-    let seeds = Seeds::make();
-    let mut readers = readers::all(&seeds);
+    let seeds = &*SEEDS;
+    let mut readers = readers::all(seeds);
     // Words in the names of the readers, separated by commas.
     if let Ok(words) = std::env::var("LANESWEEP_MUTATED_READERS") {
         readers.retain(|reader| words.split(',').any(|word| reader.name.contains(word)));
@@ -124,7 +126,7 @@ fn no_input_panics_or_takes_the_memory_or_hangs() {
     let dir = tempfile::tempdir().unwrap();
     for reader in &readers {
         for (k, seed) in reader.seeds.iter().enumerate() {
-            let read = (reader.read)(seed, dir.path(), &seeds, true);
+            let read = (reader.read)(seed, dir.path(), seeds, true);
             assert!(read.is_ok(), "seed {k} of {} is not valid: {}", reader.name, read.unwrap_err());
         }
     }
@@ -137,7 +139,7 @@ fn no_input_panics_or_takes_the_memory_or_hangs() {
         let place = info.location().map(ToString::to_string).unwrap_or_default();
         PANIC_AT.with_borrow_mut(|at| *at = place);
     }));
-    let (counts, failures) = run_all(first, inputs, &readers, &seeds);
+    let (counts, failures) = run_all(first, inputs, &readers, seeds);
     let _ = std::panic::take_hook();
     for (reader, [refused, accepted]) in readers.iter().zip(&counts) {
         println!("{:<24} {accepted:>9} accepted {refused:>9} refused", reader.name);
@@ -148,14 +150,14 @@ fn no_input_panics_or_takes_the_memory_or_hangs() {
 /// What was found once and stays refused: the text of a refusal must name the field or say what is expected.
 #[test]
 fn inputs_that_once_took_the_memory_or_panicked_are_refused_by_name() {
-    let seeds = Seeds::make();
+    let seeds = &*SEEDS;
     let dir = tempfile::tempdir().unwrap();
-    let readers = readers::all(&seeds);
+    let readers = readers::all(seeds);
     let refused = |name: &str, old: &str, new: &str, says: &str| {
         let reader = readers.iter().find(|r| r.name == name).unwrap();
         let seed = reader.seeds.iter().find(|s| String::from_utf8_lossy(s).contains(old)).expect(old);
         let bytes = String::from_utf8_lossy(seed).replacen(old, new, 1).into_bytes();
-        let error = (reader.read)(&bytes, dir.path(), &seeds, true).expect_err(new);
+        let error = (reader.read)(&bytes, dir.path(), seeds, true).expect_err(new);
         assert!(error.to_string().contains(says), "{name}, {new}: {error}");
         assert!(error.help().is_some_and(|h| !h.is_empty()), "{error}");
     };

@@ -1,5 +1,5 @@
 //! What writing a table, or reading and planning a small file of scenarios, holds in memory.
-use crate::common::tables::made;
+use crate::common::made;
 use crate::memory;
 
 use std::fs::File;
@@ -46,17 +46,17 @@ fn write(path: &Path, rows: u64) -> u64 {
 }
 
 #[test]
-fn a_million_lanes_take_no_more_memory_than_two_hundred_thousand() {
+fn half_a_million_lanes_take_no_more_memory_than_two_hundred_thousand() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("lanes.parquet");
     let mib = |bytes: u64| bytes as f64 / f64::from(1 << 20);
     let few = write(&path, 200_000);
-    let many = write(&path, 1_000_000);
-    println!("200,000 lanes: {:.1} MiB; 1,000,000 lanes: {:.1} MiB", mib(few), mib(many));
+    let many = write(&path, 500_000);
+    println!("200,000 lanes: {:.1} MiB; 500,000 lanes: {:.1} MiB", mib(few), mib(many));
     assert!(mib(many) < 1.1 * mib(few) && mib(many) < 56.0, "{few}, {many}");
     let file = ParquetRecordBatchReaderBuilder::try_new(File::open(&path).unwrap()).unwrap();
     let groups: Vec<i64> = file.metadata().row_groups().iter().map(|group| group.num_rows()).collect();
-    assert_eq!(groups, [131_072, 131_072, 131_072, 131_072, 131_072, 131_072, 131_072, 82_496]);
+    assert_eq!(groups, [131_072, 131_072, 131_072, 106_784]);
 }
 
 /// Reads a file of scenarios, accepts what is implausible, and plans the study: what was wrong, and the most bytes held

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use crate::common::device::software_device;
-use crate::common::program::{Files, files, words};
+use crate::common::program::{Files, files, put, words};
 
 const SOURCES: [&str; 9] =
     ["Cargo.toml", "Cargo.lock", "README.md", "src", "shaders", "configs", "benches", "tests", "python"];
@@ -40,10 +40,8 @@ fn copy_with_the_example(root: &Path, copy: &Path) {
     tree.insert(REGISTRY.to_owned(), (lines.join("\n") + "\n").into_bytes());
     let present = files(copy);
     present.keys().filter(|at| !tree.contains_key(*at)).for_each(|stale| fs::remove_file(copy.join(stale)).unwrap());
-    for (at, content) in tree.iter().filter(|(at, content)| present.get(*at) != Some(content)) {
-        fs::create_dir_all(copy.join(at).parent().unwrap()).unwrap();
-        fs::write(copy.join(at), content).unwrap();
-    }
+    tree.retain(|at, content| present.get(at) != Some(content));
+    put(&tree, copy);
 }
 
 /// Builds the program of the copy. Dependencies are those that are built already, because the folder of intermediate

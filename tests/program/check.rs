@@ -6,6 +6,7 @@ use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 use crate::common::program::{lanesweep, ran, words};
+use crate::common::text_of;
 
 const CASE: &str = "check --category cut-in --ego-speed 60km/h --speed 40km/h --gap 15 --lateral-speed 1";
 
@@ -46,8 +47,7 @@ fn the_sheet_and_the_series_have_one_time_of_braking() {
 
 #[test]
 fn the_numbers_of_a_row_are_those_of_simulate_and_of_its_sheet() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
+    let dir = &*crate::common::folder();
     let rows =
         "id,category,ego_speed_kmh,speed_kmh,gap,lateral_speed\nslow,cut-in,108,36,20,2\nmild,cut-in,108,72,36,1\n";
     std::fs::write(dir.join("cases.csv"), rows).unwrap();
@@ -111,10 +111,8 @@ fn a_sheet_names_program_and_profile_and_a_comment_is_no_other_profile() {
     assert!(!page.contains(none) && other_page.contains(none));
     let program = ours["program"].as_str().unwrap();
     let commit = ours["identity"]["commit"].as_str().map_or("unknown", |commit| commit);
-    assert!(
-        page.contains(&format!("{program}, commit {commit}, engine {}", ours["identity"]["engine_version"])),
-        "{commit}"
-    );
+    let named = format!("{program}, commit {commit}, engine {}", ours["identity"]["engine_version"]);
+    assert!(page.contains(&named), "{named}");
 }
 
 /// For who reads the chapter in place of a sheet.
@@ -122,8 +120,8 @@ fn a_sheet_names_program_and_profile_and_a_comment_is_no_other_profile() {
 fn the_chapter_for_assessors_lists_what_a_sheet_does_not_consider() {
     let dir = tempfile::tempdir().unwrap();
     let document = sheet(dir.path(), CASE).0;
-    let chapter = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/src/for-assessors.md")).unwrap();
-    let chapter = chapter.replace("**", "").split_whitespace().collect::<Vec<_>>().join(" ");
+    let chapter =
+        text_of("docs/src/for-assessors.md").replace("**", "").split_whitespace().collect::<Vec<_>>().join(" ");
     let not_considered = document["not_considered"].as_array().unwrap();
     assert!(not_considered.len() > 5);
     for text in not_considered {

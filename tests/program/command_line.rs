@@ -1,10 +1,9 @@
 //! The program as its users run it: help, exit codes, limits. What it answers stands in `tests/messages`.
 
 use std::path::Path;
-use std::process::{Command, Output};
 
 use crate::common;
-use crate::common::program::{PROGRAM, ran, unbroken};
+use crate::common::program::{self, ran};
 
 /// The verbs of the program, or those of one of its verbs, as its own help lists them.
 pub fn verbs_of(verb: &str) -> Vec<String> {
@@ -65,32 +64,25 @@ fn help_names_every_verb_and_every_exit_code() {
     }
 }
 
-#[cfg(unix)]
-fn limited(limit: &str, args: &str) -> Output {
-    let script = format!("ulimit {limit}; exec \"$0\" {args}");
-    // The environment counts as stack before the program begins, and cargo's is large.
-    let mut shell = Command::new("sh");
-    shell.env_clear().env("PATH", std::env::var_os("PATH").unwrap_or_default());
-    shell.args(["-c", &script, PROGRAM]).output().unwrap()
+#[cfg(target_os = "linux")]
+fn limited(limit: &str, line: &str) -> (i32, String) {
+    let (code, _, err) = program::limited(Path::new("."), &format!("ulimit {limit}"), &program::words(line));
+    (code, program::unbroken(err.as_bytes()))
 }
 
 #[cfg(target_os = "linux")]
 #[test]
 fn an_address_space_that_is_too_small_is_told_with_its_limit_and_is_no_crash() {
     // Below, the system's loader does not get as far as the program.
-    let is_loaded = |kib: &u32| limited(&format!("-v {kib}"), "--version").status.success();
+    let is_loaded = |kib: &u32| limited(&format!("-v {kib}"), "--version").0 == 0;
     let mut limits = (20_000..400_000).step_by(1000).skip_while(|kib| !is_loaded(kib)).step_by(2).take(25);
     let (mut done, mut refused) = (0, 0);
     assert!(limits.all(|kib| {
         let case = "--category cut-in --ego-speed 30m/s --speed 20m/s --lateral-speed 1.5 --models Reg157 --thw 1";
-        let output = limited(&format!("-v {kib}"), &format!("simulate {case} --threads 4096"));
-        let said = unbroken(&output.stderr);
-        match output.status.code() {
-            Some(0) => done += 1,
-            Some(6) => refused += 1,
-            other => panic!("{kib} KiB: {other:?} {:?} {said}", output.status),
-        }
-        assert!(output.status.success() || said.contains("ulimit -v"), "{kib} KiB: {said}");
+        let (code, said) = limited(&format!("-v {kib}"), &format!("simulate {case} --threads 4096"));
+        assert!(code == 0 || code == 6 && said.contains("ulimit -v"), "{kib} KiB: {code} {said}");
+        done += u32::from(code == 0);
+        refused += u32::from(code == 6);
         true
     }));
     println!("{done} runs were done, {refused} were refused");
@@ -105,10 +97,8 @@ fn too_many_open_files_are_answered_with_their_limit() {
     for files in 4..12 {
         let scenarios = common::golden("paper_sumo_01_02_scenarios.jsonl");
         let study = format!("study --scenarios {} --out {}", scenarios.display(), dir.path().display());
-        let output = limited(&format!("-n {files}"), &study);
-        let said = unbroken(&output.stderr);
+        let (code, said) = limited(&format!("-n {files}"), &study);
         // The system's loader needs files too, beside those that are open here.
-        let code = output.status.code().unwrap();
         assert!([0, 6, 127].contains(&code), "{files}: {said}");
         assert!(code != 6 || said.contains("ulimit -n") && !said.contains("disk"), "{files}: {said}");
         refused += u32::from(code == 6);

@@ -9,8 +9,7 @@ use crate::common::program::{json, ran};
 
 #[test]
 fn every_verb_takes_its_values_from_all_layers() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
+    let dir = &*crate::common::folder();
     let tables = "[run]\nbackend = \"cpu\"\n[generator]\nrecordings = 2\nduration_s = 100\n[score]\nseed = 11\n\
                   min_failures = 20\n[fit]\nseed = 12\nvalid_draws = 1000\n[sample]\nseed = 13\nsamples = 1e2\n";
     std::fs::write(dir.join("a.toml"), tables).unwrap();
@@ -60,8 +59,7 @@ fn changed(key: &Key) -> Value {
 
 #[test]
 fn every_record_names_every_setting_with_its_source() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
+    let dir = &*crate::common::folder();
     // A device needs another backend; a width and a time decide how many samples are drawn, and what ends.
     let unset = ["run.device", "run.stop_after_s", "sample.half_width", "sample.time_limit_s"];
     let keys: Vec<Key> = Key::all().into_iter().filter(|key| !unset.contains(&key.name.as_str())).collect();

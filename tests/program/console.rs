@@ -8,6 +8,7 @@ use std::process::Command;
 use rayon::prelude::*;
 
 use crate::common::program::PROGRAM;
+use crate::common::with_threads;
 
 /// Runs the commands of a Markdown file, in order, in a folder, and returns where they print something else than stands
 /// there; `None` if they do not.
@@ -81,22 +82,20 @@ fn line_fits(expected: &str, found: &str) -> bool {
 /// Answers and messages stand in `tests/messages/*.md`, the files that provoke them in the folders beside.
 #[test]
 fn every_answer_and_every_mistake_is_told_as_it_stands_in_the_messages() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/messages");
+    let folder = crate::common::in_crate("tests/messages");
     let files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     let texts: Vec<_> = files.iter().filter(|path| path.extension().is_some_and(|ending| ending == "md")).collect();
     assert_eq!(texts.len(), 9);
     // The README's second command tests a program without Parquet.
     let needs_parquet = |line: &str| line.starts_with("$ ") && line.contains(".parquet");
     assert!(!texts.iter().any(|text| std::fs::read_to_string(text).unwrap().lines().any(needs_parquet)));
-    // A panic in a thread of the pool would be printed with another test, or not at all. A pool of its own, because these
-    // threads wait for programs and sweeps in other tests would wait for them.
-    let pool = rayon::ThreadPoolBuilder::new().build().unwrap();
-    let differences = texts.par_iter().filter_map(|text| {
+    let of = |text: &&std::path::PathBuf| {
         let dir = tempfile::tempdir().unwrap();
         crate::common::program::copy(&text.with_extension("in"), dir.path());
         difference(text, dir.path())
-    });
-    let differences: Vec<String> = pool.install(|| differences.collect());
+    };
+    // Threads of its own: those that all tests have would wait for the commands.
+    let differences: Vec<String> = with_threads(2, || texts.par_iter().filter_map(of).collect());
     assert!(differences.is_empty(), "{}", differences.join("\n\n"));
 }
 

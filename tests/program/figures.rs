@@ -2,9 +2,11 @@
 //! `LANESWEEP_RENEW_FIGURES=1 cargo test --release --test commands figures::` writes the tables again.
 
 use std::fs;
-use std::path::Path;
 
+use crate::common::in_crate;
+use crate::common::mined::scenarios_of;
 use crate::common::program::ran;
+use lanesweep::scenario::write_scenarios;
 
 /// The figures of cut-ins whose tables are kept.
 const KEPT: [&str; 2] = ["f1", "radar"];
@@ -12,11 +14,12 @@ const KEPT: [&str; 2] = ["f1", "radar"];
 #[test]
 fn the_tables_of_the_figures_are_those_that_were_looked_at() {
     let dir = tempfile::tempdir().unwrap();
-    ran(dir.path(), "-q study --synth-recordings 12 --categories cut-in --thw 0.4,1.2 --backend cpu --out .");
-    let kept = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/figures");
+    write_scenarios(&dir.path().join("s.jsonl"), scenarios_of(12)).unwrap();
+    ran(dir.path(), "-q study --scenarios s.jsonl --categories cut-in --thw 0.4,1.2 --backend cpu --out out");
+    let kept = in_crate("tests/figures");
     for figure in KEPT {
         let name = format!("{figure}-cut-in.csv");
-        let now = fs::read_to_string(dir.path().join("tables").join(&name)).unwrap();
+        let now = fs::read_to_string(dir.path().join("out/tables").join(&name)).unwrap();
         if std::env::var_os("LANESWEEP_RENEW_FIGURES").is_some() {
             fs::write(kept.join(&name), &now).unwrap();
         }

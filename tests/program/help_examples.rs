@@ -2,17 +2,16 @@
 
 use std::collections::BTreeSet;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
-use crate::common::program::PROGRAM;
-use crate::common::skipped;
+use crate::common::program::{command, words};
+use crate::common::{in_crate, skipped};
 use crate::program::command_line::verbs_of;
 
 fn run(dir: &Path, line: &str) -> Output {
-    let mut command = Command::new(PROGRAM);
     // Help in one line per example.
-    command.current_dir(dir).env("COLUMNS", "1000").env("LANESWEEP_CONFIG", "fewer.toml");
-    command.args(line.split_whitespace().skip(1)).output().unwrap()
+    let envs = [("COLUMNS", "1000"), ("LANESWEEP_CONFIG", "fewer.toml")];
+    command(dir, &words(line)[1..]).envs(envs).output().unwrap()
 }
 
 fn message_of(output: &Output) -> String {
@@ -73,8 +72,7 @@ fn tracks() -> String {
 #[test]
 #[ignore = "half a minute and more: .ci/run long-tests"]
 fn every_example_of_the_help_runs() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
+    let dir = &*crate::common::folder();
     std::fs::write(dir.join("fewer.toml"), "[generator]\nrecordings = 12\n").unwrap();
     let mut ran = BTreeSet::new();
     for verb in verbs() {
@@ -92,8 +90,7 @@ fn every_example_of_the_help_runs() {
             let case = "category,ego_speed_mps,speed_mps,gap,lateral_speed\n";
             std::fs::write(dir.join("cases.csv"), format!("{case}cut-in,30,20,20,1\ncut-in,30,20,40,1\n")).unwrap();
             std::fs::write(dir.join("own.csv"), tracks()).unwrap();
-            let generic = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/presets/generic.toml");
-            std::fs::copy(generic, dir.join("own.toml")).unwrap();
+            std::fs::copy(in_crate("configs/presets/generic.toml"), dir.join("own.toml")).unwrap();
             std::fs::write(dir.join("study.toml"), "[score]\nmin_failures = 5\n").unwrap();
             let output = run(dir, &smaller(&example));
             // Without a GPU `verify` says so.

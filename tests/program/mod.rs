@@ -11,3 +11,5 @@ mod help_examples;
 mod report_page;
 mod report_width;
 mod source_rules;
+#[cfg(not(feature = "gpu"))]
+mod without_gpu;

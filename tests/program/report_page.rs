@@ -2,7 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use lanesweep::prelude::*;
+
+use crate::common::mined::{kept, scenarios_of, write_cut_in_density};
 use crate::common::program::ran;
+use crate::runs::parts::whole;
 
 fn quietly(dir: &Path, line: &str) {
     ran(dir, &format!("-q {line}"));
@@ -52,17 +56,8 @@ fn page(dir: &Path) -> String {
     html
 }
 
-fn scenarios(dir: &Path) -> Vec<String> {
-    quietly(dir, "tracks --convert recordings --synth-recordings 2 --config generator.duration_s=240");
-    quietly(dir, "mine recordings --out all.jsonl");
-    let text = std::fs::read_to_string(dir.join("all.jsonl")).unwrap();
-    let kept = text.lines().filter(|line| line.contains("\"kept\":true")).map(str::to_owned).collect::<Vec<_>>();
-    assert!(kept.len() > 20);
-    kept
-}
-
-fn study(dir: &Path, name: &str, lines: &[String]) -> (PathBuf, String) {
-    std::fs::write(dir.join("some.jsonl"), lines.join("\n") + "\n").unwrap();
+fn study(dir: &Path, name: &str, scenarios: &[Scenario]) -> (PathBuf, String) {
+    write_scenarios(&dir.join("some.jsonl"), scenarios).unwrap();
     quietly(dir, &format!("study --scenarios some.jsonl --backend cpu --out {name}"));
     let out = dir.join(name);
     let html = page(&out);
@@ -71,10 +66,8 @@ fn study(dir: &Path, name: &str, lines: &[String]) -> (PathBuf, String) {
 
 #[test]
 fn a_study_says_everything_on_its_page_and_every_figure_has_its_files() {
-    let dir = tempfile::tempdir().unwrap();
-    quietly(dir.path(), "study --synth-recordings 2 --published --backend cpu --out s");
-    let out = dir.path().join("s");
-    let html = page(&out);
+    let (out, _) = whole();
+    let html = page(out);
     let plan = "<dt>SHA-256 of the plan</dt>";
     for said in ["SYNTHETIC DATA", "Failed simulations of S", "published", plan, "seed", "Claims"] {
         assert!(html.contains(said), "{said}");
@@ -97,31 +90,24 @@ fn a_study_says_everything_on_its_page_and_every_figure_has_its_files() {
 #[test]
 fn little_data_makes_a_readable_page_too() {
     let dir = tempfile::tempdir().unwrap();
-    let all = scenarios(dir.path());
-    let of = |category: &str| -> Vec<String> {
-        all.iter().filter(|line| line.contains(&format!("\"category\":\"{category}\""))).cloned().collect()
-    };
+    let of = |category| kept(scenarios_of(2), category).into_iter().cloned().collect::<Vec<_>>();
     // One scenario: too few for a decomposition; nothing of the other categories.
-    let one = of("cut_in")[..1].to_vec();
-    let (out, html) = study(dir.path(), "one", &one);
+    let (out, html) = study(dir.path(), "one", &of(Category::CutIn)[..1]);
     assert!(html.contains("cut-in: agreement") && !html.contains("LVD: agreement"));
     assert!(out.join("figures/f1-cut-in.svg").exists());
     // Where nothing fails F1 is undefined, and said to be.
     assert!(html.contains("<td>-</td>"), "an undefined F1 has a dash");
     // None of one category.
-    let mut two = of("cut_in");
-    two.extend(of("lvd"));
-    let (out, html) = study(dir.path(), "two", &two);
+    let (out, html) = study(dir.path(), "two", &[of(Category::CutIn), of(Category::Lvd)].concat());
     assert!(html.contains("LVD: agreement") && !html.contains("cut-out: agreement"));
     assert!(!out.join("figures/radar-cut-out.svg").exists());
 }
 
 #[test]
 fn sampling_runs_maps_and_comparisons_have_their_page() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    quietly(dir, "fit --synth-recordings 3 --categories cut-in --parameterizations 2 --out d");
-    let sample = "sample d/cut-in-2.json --backend cpu --samples 3000";
+    let dir = &*crate::common::folder();
+    write_cut_in_density(&dir.join("d.json"));
+    let sample = "sample d.json --backend cpu --samples 3000";
     quietly(dir, &format!("{sample} --thw 1,0.6,0.2 --out mc"));
     let html = page(&dir.join("mc"));
     for said in ["<dt>SHA-256 of the density</dt>", "usable"] {

@@ -2,17 +2,13 @@
 //! unsafe code and what changes the process are clippy's.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 use std::process::Command;
 
-fn root() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-}
+use crate::common::{in_crate, text_of as read};
 
 /// A release is named alike wherever it is cited, packaged or archived (RELEASING.md).
 #[test]
 fn every_description_of_the_release_has_its_name_and_version() {
-    let read = |name: &str| std::fs::read_to_string(root().join(name)).expect(name);
     let version = env!("CARGO_PKG_VERSION");
     let zenodo: serde_json::Value = serde_json::from_str(&read(".zenodo.json")).expect(".zenodo.json");
     assert_eq!((zenodo["title"].as_str(), zenodo["version"].as_str()), (Some("lanesweep"), Some(version)));
@@ -33,7 +29,7 @@ fn every_description_of_the_release_has_its_name_and_version() {
 /// Packages with their features in the dependency tree of these edges and features of the crate.
 fn features_of(edges: &str, features: &[&str]) -> BTreeMap<String, String> {
     let cargo = Command::new(env!("CARGO"))
-        .current_dir(root())
+        .current_dir(in_crate(""))
         .args(["tree", "--locked", "--offline", "--prefix", "none", "--format", "{p}|{f}", "--edges", edges])
         .args(features)
         .output()

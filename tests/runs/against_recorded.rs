@@ -2,13 +2,8 @@
 
 use crate::common::mined;
 use lanesweep::Place;
-use lanesweep::engine::{CpuBackend, Executor, Headway};
-use lanesweep::model::criterion::Criterion;
-use lanesweep::model::driver::ModelId;
-use lanesweep::model::profile::Profile;
-use lanesweep::run::sampling::{EstimateRow, Estimator, Sample, SampleHeadways, SampleOptions};
-use lanesweep::scenario::{Category, Scenario};
-use lanesweep::stats::density::DensityModel;
+use lanesweep::prelude::*;
+use lanesweep::run::sampling::{EstimateRow, Estimator};
 use lanesweep::stats::estimate::{Verdict, Warning};
 
 fn density_of(key: &str, with_thw: bool) -> DensityModel {
@@ -19,15 +14,15 @@ fn density(key: &str) -> DensityModel {
     density_of(key, false)
 }
 
-fn sample(density: DensityModel, estimator: Estimator, headways: Vec<Headway>) -> Sample {
-    let mut options = SampleOptions::new(estimator, 4000, SampleHeadways::Each(headways));
-    options.models = vec![ModelId::Cchdm, ModelId::Fsm];
-    Sample::plan(density, &Profile::load("paper").unwrap(), &options).unwrap()
+fn sampled(density: DensityModel, headways: SampleHeadways) -> Vec<EstimateRow> {
+    let models = vec![ModelId::Cchdm, ModelId::Fsm];
+    let options = SampleOptions { models, ..SampleOptions::new(Estimator::Crude, 4000, headways) };
+    let sample = Sample::plan(density, &Profile::load("paper").unwrap(), &options).unwrap();
+    sample.run(&Executor::new(CpuBackend::lane_arithmetic())).unwrap().rows
 }
 
-fn rows(sample: &Sample) -> Vec<EstimateRow> {
-    let backend = CpuBackend::lane_arithmetic();
-    sample.run(&Executor::new(&backend)).unwrap().rows
+fn each() -> SampleHeadways {
+    SampleHeadways::Each(Headway::paper())
 }
 
 fn overall(rows: &[EstimateRow]) -> Vec<&EstimateRow> {
@@ -51,7 +46,7 @@ fn is_sound(row: &EstimateRow) -> bool {
 fn rates_that_are_sound_do_not_exclude_each_other() {
     let mut sound: Vec<(String, EstimateRow)> = Vec::new();
     for key in ["1", "2", "3", "4", "6", "7"] {
-        let rows = rows(&sample(density(key), Estimator::Crude, Headway::paper()));
+        let rows = sampled(density(key), each());
         for row in overall(&rows) {
             let ratios = row.recorded.unwrap();
             let agrees = ratios.replayed.agrees() && ratios.sampled.unwrap().agrees();
@@ -81,15 +76,11 @@ fn rates_that_are_sound_do_not_exclude_each_other() {
 fn no_rate_is_sound_that_is_compared_with_nothing() {
     let mut without = density("2");
     without.scenarios.clear();
-    for row in rows(&sample(without, Estimator::Crude, Headway::paper())) {
+    for row in sampled(without, each()) {
         assert!(row.recorded.is_none() && !is_sound(&row), "{row:?}");
         assert!(row.estimate.trust.warnings.contains(&Warning::NotCompared));
     }
-    let mut options = SampleOptions::new(Estimator::Crude, 4000, SampleHeadways::Sampled);
-    options.models = vec![ModelId::Cchdm, ModelId::Fsm];
-    let profile = Profile::load("paper").unwrap();
-    let drawn = rows(&Sample::plan(density_of("2", true), &profile, &options).unwrap());
-    for row in &drawn {
+    for row in &sampled(density_of("2", true), SampleHeadways::Sampled) {
         let ratios = row.recorded.expect("S starts from its recorded gaps");
         let agrees = ratios.replayed.agrees() && ratios.sampled.unwrap().agrees();
         assert!(agrees || !is_sound(row), "{row:?}");

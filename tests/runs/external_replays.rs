@@ -9,7 +9,7 @@ use std::path::Path;
 
 /// The scenarios of some generated recordings as `scenarios.jsonl`, and the kept ones.
 fn mined(dir: &Path) -> Vec<Value> {
-    write_scenarios(&dir.join("scenarios.jsonl"), scenarios_of(8)).unwrap();
+    write_scenarios(&dir.join("scenarios.jsonl"), scenarios_of(3)).unwrap();
     let lines = std::fs::read_to_string(dir.join("scenarios.jsonl")).unwrap();
     lines.lines().map(|line| line.parse::<Value>().unwrap()).filter(|row| row["kept"] == true).collect()
 }
@@ -49,8 +49,7 @@ fn exchange(row: &mut Value) {
 
 #[test]
 fn what_is_strange_about_s_prime_is_said_and_what_cannot_be_one_is_refused() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
+    let dir = &*crate::common::folder();
     let all = mined(dir);
     let [cut_ins, cut_outs] =
         ["cut_in", "cut_out"].map(|of| all.iter().filter(|row| row["category"] == of).cloned().collect::<Vec<_>>());

@@ -2,30 +2,19 @@
 #![cfg(unix)]
 
 use std::path::Path;
-use std::process::Child;
 use std::time::{Duration, Instant};
 
-use crate::common::program::{self, names, send, start, wait_for_run, wait_until, words};
-use lanesweep::Error;
-use lanesweep::engine::verify::{SetOptions, random_plan};
-use lanesweep::engine::{CpuBackend, Executor, Wanted};
-use lanesweep::model::profile::Profile;
-use lanesweep::support::cancel::Cancel;
+use crate::common::lane_sets::random;
+use crate::common::program::{ended, names, send, start, wait_for_run, wait_until, words};
+use lanesweep::prelude::*;
 
 fn unfinished(dir: &Path) -> Vec<String> {
     names(dir).into_iter().filter(|name| name.ends_with(".part")).collect()
 }
 
-/// Exit code and stderr of a run that ends within the patience of the tests.
-fn ended(mut run: Child) -> (i32, String) {
-    wait_until("the process ends", || run.try_wait().unwrap().is_some());
-    program::ended(run)
-}
-
 /// A study that is sent `signal` while it writes its lanes.
 fn study_interrupted_by(signal: &str) -> i32 {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
+    let dir = &*crate::common::folder();
     std::fs::write(dir.join("lanes.csv"), "of an earlier run").unwrap();
     let small = "--config study.reference=true --synth-recordings 2 --config generator.duration_s=300";
     let mut study = start(dir, &words(&format!("-q --threads 1 study {small} --out out --rows lanes.csv")));
@@ -44,7 +33,7 @@ fn study_interrupted_by(signal: &str) -> i32 {
 
 /// Ten scenarios of 100 s, as a file.
 fn long_scenarios(path: &Path) {
-    let golden = std::fs::read_to_string(crate::common::golden("paper_sumo_01_02_scenarios.jsonl")).unwrap();
+    let golden = crate::common::text_of("tests/golden/paper_sumo_01_02_scenarios.jsonl");
     let mut scenario: serde_json::Value = golden.lines().next().unwrap().parse().unwrap();
     let samples = 2500;
     let speeds: Vec<f64> = (0..samples).map(|k| 25.0 + f64::from(k % 100) / 100.0).collect();
@@ -64,8 +53,7 @@ fn long_scenarios(path: &Path) {
 /// The first chunk alone, a scenario, takes 15 s.
 #[test]
 fn a_signal_ends_a_run_within_five_seconds_also_in_its_first_chunk_and_a_second_one_at_once() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
+    let dir = &*crate::common::folder();
     long_scenarios(&dir.join("long.jsonl"));
     let long = "--config study.reference=true --dt 0.0001 --scenarios long.jsonl --out out";
     let signalled = |signals: &[&str]| {
@@ -134,8 +122,7 @@ fn a_time_limit_and_a_request_are_seen_until_they_are_withdrawn() {
 
 #[test]
 fn a_sweep_whose_owner_cancels_it_ends_after_the_chunk_and_keeps_nothing() {
-    let options = SetOptions { size: 200, ..Default::default() };
-    let plan = random_plan(&Profile::load("paper").unwrap(), &options).unwrap();
+    let plan = random(&Profile::load("paper").unwrap(), 200);
     let executor = Executor { chunk_lanes: Some(100), ..Executor::new(CpuBackend::lane_arithmetic()) };
     let (cancel, mut chunks) = (executor.cancel.clone(), 0);
     let swept = executor.sweep(&plan, 0..plan.unit_count(), Wanted::Verdicts, |_| {

@@ -2,11 +2,15 @@
 //! undisturbed. Long: `LANESWEEP_KILLS=300 cargo test --release --test commands kills:: -- --nocapture`
 #![cfg(unix)]
 
-use crate::common::program::{self, Files, ended, kill, names, same, unbroken, without_times, words};
+use crate::common::mined::density_of;
+use crate::common::program::{self, Files, ended, kill, names, ran, same, unbroken, without_times, words};
+use crate::common::{Folder, folder};
 
+use lanesweep::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Child;
+use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 const LIST: &str = "lanesweep-files.json";
@@ -22,32 +26,27 @@ struct Verb {
 
 const STUDY: &str = "study --synth-recordings 1 --config generator.duration_s=120 --config study.compare_reference=true \
                      --rows out/lanes.csv --out out";
-const SAMPLE: &str = "sample d.json --thw 0.6 --models RSS --samples 3000 --out out";
+const SAMPLE: &str = "sample d.json --thw 0.6 --models RSS --samples 3000 --backend cpu --out out";
 const FIT: &str = "fit --synth-recordings 2 --categories cut-in --parameterizations 2 --config fit.valid_draws=999 \
                    --out out";
 
 #[rustfmt::skip] // a table
 const VERBS: [Verb; 5] = [
-    Verb { name: "study", record: Some("run.json"), older: Some(STUDY), run: "study --plan plan/plan.json --threads 1 --out out" },
-    Verb { name: "study --shard", record: None, older: None, run: "study --plan plan/plan.json --shard 0/2 --threads 1 --out out" },
+    Verb { name: "study", record: Some("run.json"), older: Some(STUDY), run: "study --plan plan/plan.json --backend cpu --threads 1 --out out" },
+    Verb { name: "study --shard", record: None, older: None, run: "study --plan plan/plan.json --shard 0/2 --backend cpu --threads 1 --out out" },
     Verb { name: "merge", record: Some("run.json"), older: Some(STUDY), run: "merge out" },
     Verb { name: "sample", record: Some("estimate.json"), older: Some(SAMPLE),
-           run: "sample d.json --estimator is --samples 10000 --thw 0.6 --models RSS,FSM --out out" },
+           run: "sample d.json --estimator is --samples 10000 --thw 0.6 --models RSS,FSM --backend cpu --out out" },
     Verb { name: "fit", record: None, older: Some(FIT),
            run: "fit --synth-recordings 3 --categories cut-in --config fit.valid_draws=1000 --out out" },
 ];
 
 fn start(dir: &Path, line: &str) -> Child {
-    let mut args = [&["-q"][..], &words(line)].concat();
-    if ["study --plan", "sample"].iter().any(|verb| line.starts_with(verb)) {
-        args.extend(["--backend", "cpu"]);
-    }
-    program::start(dir, &args)
+    program::start(dir, &words(&format!("-q {line}")))
 }
 
 fn done(dir: &Path, line: &str) {
-    let (code, said) = ended(start(dir, line));
-    assert!(code == 0, "{code}, {line}: {said}");
+    ran(dir, &format!("-q {line}"));
 }
 
 /// The search that a sample keeps while it draws.
@@ -86,13 +85,20 @@ fn put(dir: &Path, from: Option<&str>) {
     }
 }
 
-fn furnish(dir: &Path) {
-    done(dir, "fit --synth-recordings 2 --categories cut-in --parameterizations 2 --out d.json");
-    let plan = "study --synth-recordings 1 --config study.reference=true --dt 0.02 --plan-only";
-    done(dir, &format!("{plan} --out plan"));
-    done(dir, &format!("{plan} --out parts"));
-    done(dir, "study --plan plan/plan.json --shard 0/2 --out parts");
-    done(dir, "study --plan plan/plan.json --shard 1/2 --out parts");
+/// A folder with a density, a plan and the parts of its run, which are made once.
+fn furnished() -> Folder {
+    static MADE: LazyLock<Files> = LazyLock::new(|| {
+        let dir = &*crate::common::folder();
+        write_density(&dir.join("d.json"), &density_of(2, Category::CutIn, "2", false)).unwrap();
+        done(dir, "study --synth-recordings 1 --config study.reference=true --dt 0.02 --plan-only --out plan");
+        program::copy(&dir.join("plan"), &dir.join("parts"));
+        let _ = ["0/2", "1/2"]
+            .map(|shard| done(dir, &format!("study --plan plan/plan.json --shard {shard} --backend cpu --out parts")));
+        program::files(dir)
+    });
+    let dir = folder();
+    program::put(&MADE, &dir);
+    dir
 }
 
 /// Where `out` starts from: parts for a merge, the older result.
@@ -117,9 +123,7 @@ fn assert_tidy(dir: &Path, what: &str) {
 #[test]
 fn a_killed_run_leaves_one_runs_files_and_ends_as_if_undisturbed() {
     let kills: usize = std::env::var("LANESWEEP_KILLS").map_or(VERBS.len(), |text| text.parse().unwrap());
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    furnish(dir);
+    let dir = &*furnished();
     let mut undisturbed: BTreeMap<(usize, bool), (Duration, Files)> = BTreeMap::new();
     let (mut alive, mut continued, mut switching, mut recorded) = (0, 0, 0, 0);
     for at_kill in 0..kills {
@@ -179,8 +183,7 @@ fn a_killed_run_leaves_one_runs_files_and_ends_as_if_undisturbed() {
 
 #[test]
 fn scenarios_and_what_was_driven_for_them_are_of_one_run_after_a_kill() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
+    let dir = &*crate::common::folder();
     for (data, seed) in [("a", 1), ("b", 2)] {
         let small = "--synth-recordings 1 --config generator.duration_s=60";
         done(dir, &format!("tracks --convert {data} {small} --config generator.seed={seed}"));
@@ -212,9 +215,7 @@ fn scenarios_and_what_was_driven_for_them_are_of_one_run_after_a_kill() {
 #[test]
 fn of_two_processes_on_one_folder_each_ends_as_if_alone_or_is_refused() {
     let every = if std::env::var_os("LANESWEEP_KILLS").is_some() { 1 } else { 3 };
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    furnish(dir);
+    let dir = &*furnished();
     let alone = VERBS.map(|verb| {
         put(dir, Some("parts"));
         done(dir, verb.run);

@@ -8,6 +8,6 @@ mod kills;
 mod map;
 mod mechanisms;
 mod observed;
-mod parts;
+pub mod parts;
 mod reruns;
 mod sampling;

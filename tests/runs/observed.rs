@@ -1,12 +1,10 @@
 //! `--thw observed`: each scenario from its recorded gap.
 
-use crate::common::mined::{density_of, kept, mined, scenarios_of};
-use lanesweep::Error;
-use lanesweep::engine::{Headway, LaneKey, LaneRunner};
-use lanesweep::model::profile::Profile;
-use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, plan_samples};
-use lanesweep::run::study::{StudyOptions, plan_study};
-use lanesweep::scenario::Category;
+use crate::common::mined::{density_of, kept, scenarios_of};
+use lanesweep::engine::{LaneKey, LaneRunner};
+use lanesweep::prelude::*;
+use lanesweep::run::sampling::{Estimator, plan_samples};
+use lanesweep::run::study::plan_study;
 
 fn observed() -> StudyOptions {
     StudyOptions { headways: vec![Headway::Observed], ..StudyOptions::default() }
@@ -40,12 +38,12 @@ fn s_and_every_s_prime_start_from_the_recorded_gap() {
 
 #[test]
 fn a_scenario_without_a_recorded_gap_is_named_and_a_mixture_of_headways_is_refused() {
-    let mut data = mined(1);
-    let scenario = data.scenarios.iter_mut().find(|s| s.kept).unwrap();
+    let mut data = scenarios_of(1).to_vec();
+    let scenario = data.iter_mut().find(|s| s.kept).unwrap();
     (scenario.gap0, scenario.thw0) = (None, None);
     let id = scenario.id.clone();
     let paper = Profile::load("paper").unwrap();
-    let error = plan_study(&data.scenarios, &paper, &observed()).err().unwrap();
+    let error = plan_study(&data, &paper, &observed()).err().unwrap();
     assert!(matches!(&error, Error::Input { .. }) && error.to_string().contains(&id), "{error}");
     assert!(error.to_string().contains("gap0"), "{error}");
     let mixed = StudyOptions { headways: vec![Headway::Observed, Headway::ThwS(1.0)], ..StudyOptions::default() };

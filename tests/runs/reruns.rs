@@ -3,18 +3,15 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use crate::common::lane_sets::swept_on_cpu;
 use crate::common::mined::scenarios_of;
-use crate::common::plans::mixed;
+use crate::common::plans::mixed as drawn;
 use crate::common::program::{json, ran};
 use lanesweep::Place;
-use lanesweep::engine::{Backend, CpuBackend, LanePlan, LaneRunner, Outcome, Wanted, words as bits};
+use lanesweep::engine::{LanePlan, LaneRunner, Wanted, words as bits};
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::read_sealed_line;
 use lanesweep::run::study::{StudyHead, StudyOptions, plan_study};
-
-fn drawn(index: u64, below: u64) -> u64 {
-    mixed(157, index) % below
-}
 
 /// The plan that a study left in its folder, read as a process does that recomputes nothing.
 fn left_plan(path: &Path) -> LanePlan {
@@ -29,14 +26,12 @@ fn left_plan(path: &Path) -> LanePlan {
 
 #[test]
 fn random_lanes_of_a_study_are_the_studys_lanes() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    ran(dir, "-q study --synth-recordings 12 --backend cpu --out result");
+    let dir = &*crate::common::folder();
+    ran(dir, "-q study --synth-recordings 4 --backend cpu --out result");
     // The study itself, as it sweeps: in batches, on the widest instructions.
     let options = StudyOptions { folds: Some(5), ..StudyOptions::default() };
-    let study = plan_study(scenarios_of(12), &Profile::load("paper").unwrap(), &options).unwrap();
-    let mut session = CpuBackend::lane_arithmetic().prepare(&study).unwrap();
-    let outcomes: Vec<Outcome<f64>> = session.run(0..study.unit_count(), Wanted::Outcomes).unwrap().outcomes;
+    let study = plan_study(scenarios_of(4), &Profile::load("paper").unwrap(), &options).unwrap();
+    let outcomes = swept_on_cpu(&study, Wanted::Outcomes).outcomes;
     assert_eq!(outcomes.len() as u64, study.lane_count());
     // The reruns: from the folder.
     let plan = left_plan(&dir.join("result/run-plan.json"));
@@ -45,7 +40,7 @@ fn random_lanes_of_a_study_are_the_studys_lanes() {
     let runner = LaneRunner::<f32>::new(&plan);
     let mut seen = BTreeSet::new();
     for index in 0..500 {
-        let lane = drawn(index, study.lane_count());
+        let lane = drawn(157, index) % study.lane_count();
         let text = study.key_text(&study.key(lane).unwrap());
         let key = plan.parse_key(&text).unwrap();
         let trace = runner.trace(&key);

@@ -3,12 +3,11 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use crate::common::program::{done as good, flat, lanesweep, words};
+use lanesweep::scenario::write_scenarios;
 
-fn refused(dir: &Path, args: &[&str], status: i32, says: &str) {
-    let (code, _, said) = lanesweep(dir, args);
-    assert!(code == status && flat(&said).contains(says), "{args:?}: {code} {said}");
-}
+use crate::common::mined::{scenarios_of, write_cut_in_density};
+use crate::common::program::{done, names, ran, refused, table};
+use crate::common::text_of;
 
 struct Found {
     path: String,
@@ -88,11 +87,9 @@ struct Played {
 fn played(text: &str) -> (HashMap<String, Played>, Vec<Found>) {
     let all = elements(text);
     let mut vehicles: HashMap<String, Played> = HashMap::new();
-    let mut name = String::new();
-    let mut time = 0.0;
+    let (mut name, mut time) = (String::new(), 0.0);
     for found in &all {
-        let last = found.path.rsplit('/').next().unwrap();
-        match last {
+        match found.path.rsplit('/').next().unwrap() {
             "ScenarioObject" => name = found.attributes["name"].clone(),
             "Private" | "EntityRef" => name = found.attributes["entityRef"].clone(),
             "Center" => vehicles.entry(name.clone()).or_default().centre_m = found.number("x"),
@@ -119,8 +116,7 @@ fn played(text: &str) -> (HashMap<String, Played>, Vec<Found>) {
 }
 
 fn series(text: &str) -> Vec<HashMap<String, String>> {
-    let mut reader = csv::Reader::from_reader(text.as_bytes());
-    reader.deserialize().map(Result::unwrap).collect()
+    csv::Reader::from_reader(text.as_bytes()).deserialize().map(Result::unwrap).collect()
 }
 
 /// Every vertex against the series: time and place across the road to the bit, place along it to the bit of the
@@ -151,32 +147,31 @@ fn compare(scenario: &str, csv: &str) -> usize {
     rows.len()
 }
 
-fn cut_in() -> Vec<&'static str> {
-    words("--category cut-in --models FSM --ego-speed 30m/s --speed 20m/s --thw 1.2 --lateral-speed 1")
-}
+const CUT_IN: &str = "--category cut-in --models FSM --ego-speed 30m/s --speed 20m/s --thw 1.2 --lateral-speed 1";
+const CUT_OUT: &str = "--category cut-out --models RSS --ego-speed 27.3m/s --gap 31 --lateral-speed 1.1 --ahead-gap 42 --ahead-speed 26m/s";
 
-fn cut_out() -> Vec<&'static str> {
-    words(
-        "--category cut-out --models RSS --ego-speed 27.3m/s --gap 31 --lateral-speed 1.1 --ahead-gap 42 --ahead-speed 26m/s",
-    )
-}
-
-fn only_scenario(dir: &Path) -> String {
-    let found: Vec<_> = std::fs::read_dir(dir).unwrap().map(|e| e.unwrap().path()).collect();
-    let found: Vec<_> = found.iter().filter(|p| p.extension().is_some_and(|e| e == "xosc")).collect();
+/// The only file of this ending in the folder `x`.
+fn only(dir: &Path, ending: &str) -> String {
+    let all = std::fs::read_dir(dir.join("x")).unwrap().map(|entry| entry.unwrap().path());
+    let found: Vec<_> = all.filter(|path| path.extension().is_some_and(|own| own == ending)).collect();
     assert_eq!(found.len(), 1, "{found:?}");
-    std::fs::read_to_string(found[0]).unwrap()
+    std::fs::read_to_string(&found[0]).unwrap()
+}
+
+/// The only scenario that these flags export.
+fn exported(dir: &Path, flags: &str) -> String {
+    ran(dir, &format!("simulate --xosc x {flags}"));
+    only(dir, "xosc")
 }
 
 #[test]
 fn every_vertex_of_a_case_of_flags_is_that_of_its_series() {
     let dir = tempfile::tempdir().unwrap();
-    let lvd = words("--category lvd --models CCHDM --ego-speed 25m/s --gap 20 --acceleration -6.5");
-    for flags in [&cut_in()[..], &cut_out(), &lvd] {
-        for more in [&[][..], &["--profile", "jrc-2021"], &["--dt", "0.007"], &["--length", "11.3", "--width", "2.3"]] {
-            let csv = good(dir.path(), &[&["simulate"], flags, more].concat());
-            good(dir.path(), &[&["simulate", "--xosc", "x"], flags, more].concat());
-            assert!(compare(&only_scenario(&dir.path().join("x")), &csv) > 20, "{flags:?} {more:?}");
+    for flags in [CUT_IN, CUT_OUT, "--category lvd --models CCHDM --ego-speed 25m/s --gap 20 --acceleration -6.5"] {
+        for more in ["", "--profile jrc-2021", "--dt 0.007", "--length 11.3 --width 2.3"] {
+            let case = format!("{flags} {more}");
+            let csv = ran(dir.path(), &format!("simulate {case}"));
+            assert!(compare(&exported(dir.path(), &case), &csv) > 20, "{case}");
         }
     }
 }
@@ -185,17 +180,12 @@ fn every_vertex_of_a_case_of_flags_is_that_of_its_series() {
 #[test]
 fn a_cut_out_whose_other_vehicles_overlap_says_so_in_its_file() {
     let dir = tempfile::tempdir().unwrap();
-    let case = |lateral: &'static str, ahead_gap: &'static str| {
-        let case =
-            ["--category", "cut-out", "--models", "FSM", "--ego-speed", "20m/s", "--gap", "40", "--ahead-speed", "0"];
-        [&case[..], &["--lateral-speed", lateral, "--ahead-gap", ahead_gap]].concat()
-    };
+    let case =
+        "--category cut-out --models FSM --ego-speed 20m/s --gap 40 --ahead-speed 0 --lateral-speed 0.8 --ahead-gap";
     // By hand: 1.9 m across at 0.8 m/s take 2.375 s; at 20 m/s the bumpers meet after 30 m in 1.5 s. After 100 m in 5 s
     // the vehicles are apart.
-    for (flags, first_s) in [(case("0.8", "30"), Some(1.5)), (case("0.8", "100"), None)] {
-        good(dir.path(), &[&["simulate", "--xosc", "x"], &flags[..]].concat());
-        let text = only_scenario(&dir.path().join("x"));
-        let (vehicles, all) = played(&text);
+    for (ahead_gap, first_s) in [("30", Some(1.5)), ("100", None)] {
+        let (vehicles, all) = played(&exported(dir.path(), &format!("{case} {ahead_gap}")));
         let (other, ahead) = (&vehicles["Other"], &vehicles["Ahead"]);
         let overlap = other.path.iter().zip(&ahead.path).find(|(a, b)| {
             (a.1 - b.1).abs() < (other.length_m + ahead.length_m) / 2.0
@@ -220,29 +210,24 @@ fn a_cut_out_whose_other_vehicles_overlap_says_so_in_its_file() {
 
 #[test]
 fn lanes_of_a_study_and_of_a_sampling_run_are_those_of_simulate_in_binary32() {
-    let dir = tempfile::tempdir().unwrap();
-    let root = dir.path();
-    good(root, &["tracks", "--convert", "data", "--synth-recordings", "1"]);
-    good(root, &["mine", "data", "--out", "s.jsonl"]);
-    let rows = ["--rows", "lanes.csv"];
-    good(root, &[&["study", "--scenarios", "s.jsonl", "--backend", "cpu", "--out", "study"][..], &rows].concat());
+    let root = &*crate::common::folder();
+    write_scenarios(&root.join("s.jsonl"), scenarios_of(1)).unwrap();
+    ran(root, "study --scenarios s.jsonl --backend cpu --out study --rows lanes.csv");
     // The first lanes that collide, by their keys.
-    let mut reader = csv::Reader::from_path(root.join("lanes.csv")).unwrap();
-    let rows = reader.deserialize::<HashMap<String, String>>().map(Result::unwrap);
-    let colliding = rows.filter(|row| row["collision"] == "1");
-    let key =
-        |row: HashMap<String, String>| format!("{}/{}/{}/{}", row["id"], row["variant"], row["headway"], row["model"]);
-    let keys: Vec<String> = colliding.map(key).take(6).collect();
-    let lanes: Vec<&str> = keys.iter().flat_map(|key| ["--lane", key]).collect();
-    let check = |args: &[&str], from: &str| {
-        let printed = series(&good(root, &[&["simulate", "--xosc", "x"], args].concat()));
-        let index = series(&std::fs::read_to_string(root.join("x/index.csv")).unwrap());
+    let rows = table(&root.join("lanes.csv"));
+    let colliding = rows.iter().filter(|row| row["collision"] == "1").take(6);
+    let lanes: Vec<String> = colliding
+        .map(|row| format!("--lane {}/{}/{}/{}", row["id"], row["variant"], row["headway"], row["model"]))
+        .collect();
+    let check = |flags: &str, from: &str| {
+        let printed = series(&ran(root, &format!("simulate --xosc x --from {from} {flags}")));
+        let index = table(&root.join("x/index.csv"));
         let mut lanes: Vec<_> = printed.iter().filter_map(|row| row.get("lane")).collect();
         lanes.dedup();
         assert!(index.len() == 1 || lanes == index.iter().map(|row| &row["lane"]).collect::<Vec<_>>(), "{lanes:?}");
         for row in &index {
             let (file, lane) = (&row["file"], row["lane"].as_str());
-            let csv = good(root, &["simulate", "--from", from, "--lane", lane]);
+            let csv = ran(root, &format!("simulate --from {from} --lane {lane}"));
             let text = std::fs::read_to_string(root.join("x").join(file)).unwrap();
             compare(&text, &csv);
             let (_, all) = played(&text);
@@ -253,32 +238,25 @@ fn lanes_of_a_study_and_of_a_sampling_run_are_those_of_simulate_in_binary32() {
         index.len()
     };
     // Lengths by their sums, then by the scenarios; both keep every gap.
-    assert_eq!(check(&[&["--from", "study", "--side", "left"], &lanes[..]].concat(), "study"), 6);
-    let flags = ["--from", "study", "--scenarios", "s.jsonl", "--side", "left", "--lane", &keys[0]];
-    assert_eq!(check(&flags, "study"), 1);
+    assert_eq!(check(&format!("--side left {}", lanes.join(" ")), "study"), 6);
+    assert_eq!(check(&format!("--scenarios s.jsonl --side left {}", lanes[0]), "study"), 1);
     // What an earlier export left does not stand beside the new files.
     assert_eq!(std::fs::read_dir(root.join("x")).unwrap().count(), 4);
 
-    good(root, &["fit", "--scenarios", "s.jsonl", "--categories", "cut-in", "--parameterizations", "2", "--out", "d"]);
-    good(root, &["sample", "d/cut-in-2.json", "--samples", "500", "--backend", "cpu", "--thw", "0.6", "--out", "run"]);
-    assert_eq!(check(&["--from", "run", "--lane", "#0/2/0.6s/FSM", "--lane", "#7/2/0.6s/RSS"], "run"), 2);
-    refused(
-        root,
-        &["simulate", "--xosc", "x", "--from", "study", "--lane", "no/S/1.2s/RSS"],
-        2,
-        "there is no lane `no/S/1.2s/RSS`: no scenario `no` in this run",
-    );
+    write_cut_in_density(&root.join("d.json"));
+    ran(root, "sample d.json --samples 500 --backend cpu --thw 0.6 --out run");
+    assert_eq!(check("--lane #0/2/0.6s/FSM --lane #7/2/0.6s/RSS", "run"), 2);
+    let says = "there is no lane `no/S/1.2s/RSS`: no scenario `no` in this run";
+    refused(root, "simulate --xosc x --from study --lane no/S/1.2s/RSS", 2, says);
 }
 
 #[test]
 fn an_ego_of_the_users_own_has_a_start_and_no_path_and_the_others_go_on() {
     let dir = tempfile::tempdir().unwrap();
-    let csv = good(dir.path(), &[&["simulate"], &cut_in()[..]].concat());
-    let rows = series(&csv);
+    let rows = series(&ran(dir.path(), &format!("simulate {CUT_IN}")));
     let end: f64 = rows.last().unwrap()["t_s"].parse().unwrap();
-    for (flags, min_s) in [(&[][..], end + 9.9), (&["--duration", "30"], 30.0)] {
-        good(dir.path(), &[&["simulate", "--xosc", "x", "--ego", "external"], &cut_in()[..], flags].concat());
-        let text = only_scenario(&dir.path().join("x"));
+    for (flags, min_s) in [("", end + 9.9), ("--duration 30", 30.0)] {
+        let text = exported(dir.path(), &format!("--ego external {CUT_IN} {flags}"));
         let (vehicles, all) = played(&text);
         assert!(vehicles["Ego"].path.is_empty());
         let path = &vehicles["Other"].path;
@@ -291,40 +269,27 @@ fn an_ego_of_the_users_own_has_a_start_and_no_path_and_the_others_go_on() {
         assert!(((b.1 - a.1) / (b.0 - a.0) - 20.0).abs() < 1e-6 && b.2 == 0.0);
         let stop = all.iter().rev().find(|e| e.path.ends_with("SimulationTimeCondition")).unwrap();
         assert_eq!(stop.number("value"), b.0);
-        let declared = named(&all, "ego_speed_mps").unwrap();
-        assert_eq!(declared.number("value"), 30.0);
+        assert_eq!(named(&all, "ego_speed_mps").unwrap().number("value"), 30.0);
         assert!(text.contains("<AbsoluteTargetSpeed value=\"$ego_speed_mps\"/>"));
     }
-    refused(
-        dir.path(),
-        &[&["simulate", "--xosc", "x", "--duration", "5"], &cut_in()[..]].concat(),
-        2,
-        "add --ego external",
-    );
+    refused(dir.path(), &format!("simulate --xosc x --duration 5 {CUT_IN}"), 2, "add --ego external");
     // The declared speed is the case's to the bit: ten digits of 20 km/h gave another first gap and another braking.
     for kmh in [7.0, 20.0, 33.3, 50.0, 108.0] {
-        let ego = format!("{kmh}km/h");
-        let case = ["--category", "cut-in", "--models", "FSM", "--ego-speed", &ego, "--speed", "1m/s", "--gap", "9"];
-        let flags = ["simulate", "--xosc", "x", "--ego", "external", "--lateral-speed", "1"];
-        good(dir.path(), &[&flags[..], &case].concat());
-        let (_, all) = played(&only_scenario(&dir.path().join("x")));
+        let case = "--ego external --category cut-in --models FSM --speed 1m/s --gap 9 --lateral-speed 1";
+        let (_, all) = played(&exported(dir.path(), &format!("{case} --ego-speed {kmh}km/h")));
         let declared = named(&all, "ego_speed_mps").unwrap();
-        assert_eq!(declared.number("value") * 0.04, kmh / 3.6 * 0.04, "{ego}");
+        assert_eq!(declared.number("value") * 0.04, kmh / 3.6 * 0.04, "{kmh} km/h");
     }
 }
 
 #[test]
 fn a_right_hand_cutter_is_mirrored_and_the_road_holds_everybody() {
     let dir = tempfile::tempdir().unwrap();
-    let read = |flags: &[&str]| {
-        good(dir.path(), &[&["simulate", "--xosc", "x"], &cut_in()[..], flags].concat());
-        let text = only_scenario(&dir.path().join("x"));
-        let road = std::fs::read_dir(dir.path().join("x")).unwrap().map(|e| e.unwrap().path());
-        let road = road.into_iter().find(|p| p.extension().is_some_and(|e| e == "xodr")).unwrap();
-        (played(&text).0, elements(&std::fs::read_to_string(road).unwrap()))
+    let read = |side: &str| {
+        let text = exported(dir.path(), &format!("{CUT_IN} --lane-width 3 --side {side}"));
+        (played(&text).0, elements(&only(dir.path(), "xodr")))
     };
-    let (left, _) = read(&["--side", "left", "--lane-width", "3"]);
-    let (right, road) = read(&["--side", "right", "--lane-width", "3"]);
+    let ((left, _), (right, road)) = (read("left"), read("right"));
     for (a, b) in left["Other"].path.iter().zip(&right["Other"].path) {
         assert_eq!((a.0, a.1, a.2), (b.0, b.1, -b.2));
     }
@@ -343,8 +308,7 @@ fn a_right_hand_cutter_is_mirrored_and_the_road_holds_everybody() {
 #[test]
 fn odd_names_are_escaped_and_read_back_and_make_plain_file_names() {
     let dir = tempfile::tempdir().unwrap();
-    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/paper_sumo_01_02_scenarios.jsonl");
-    let text = std::fs::read_to_string(golden).unwrap();
+    let text = text_of("tests/golden/paper_sumo_01_02_scenarios.jsonl");
     let line = text.lines().find(|l| l.contains("\"cut_in\"")).unwrap();
     let mut scenario: serde_json::Value = serde_json::from_str(line).unwrap();
     for (id, read) in [
@@ -357,15 +321,13 @@ fn odd_names_are_escaped_and_read_back_and_make_plain_file_names() {
         scenario["id"] = id.into();
         std::fs::write(dir.path().join("s.jsonl"), scenario.to_string() + "\n").unwrap();
         let lane = format!("{id}/S/1.2s/FSM");
-        good(dir.path(), &["simulate", "--xosc", "x", "--scenarios", "s.jsonl", "--lane", &lane]);
-        let (_, all) = played(&only_scenario(&dir.path().join("x")));
+        done(dir.path(), &["simulate", "--xosc", "x", "--scenarios", "s.jsonl", "--lane", &lane]);
+        let (_, all) = played(&only(dir.path(), "xosc"));
         let property = named(&all, "lanesweep.lane").unwrap();
         assert_eq!(property.attributes["value"], format!("{read}/S/1.2s/FSM"));
-        for entry in std::fs::read_dir(dir.path().join("x")).unwrap() {
-            let name = entry.unwrap().file_name().into_string().unwrap();
+        for name in names(&dir.path().join("x")) {
             assert!(name.bytes().all(|b| b.is_ascii_alphanumeric() || b"._-".contains(&b)), "{name}");
         }
-        let index = series(&std::fs::read_to_string(dir.path().join("x/index.csv")).unwrap());
-        assert_eq!(index[0]["lane"], lane);
+        assert_eq!(table(&dir.path().join("x/index.csv"))[0]["lane"], lane);
     }
 }

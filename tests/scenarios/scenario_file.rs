@@ -1,41 +1,81 @@
 //! The scenario file: what is written is read to the last bit.
 
 use lanesweep::model::plausibility::Implausible;
-use lanesweep::scenario::{
-    Category, Ego, Other, Scenario, Side, read_scenario_file, read_scenarios, write_scenarios, write_scenarios_to,
-};
+use lanesweep::prelude::*;
+use lanesweep::scenario::{Ego, Other, Side, read_scenario_file, write_scenarios_to};
 
 use crate::common;
+use crate::common::dice::{Dice, cases};
 
-fn cut_out() -> Scenario {
-    let series = |from: f64| (0..4).map(|k| from + f64::from(k) / 3.0).collect::<Vec<_>>();
-    let other = |y: f64| Other { length: 4.53, width: 1.9, v: series(22.0), y: series(y) };
+/// The scenarios as text, which has every bit of theirs.
+fn text_of(scenarios: &[Scenario]) -> String {
+    let mut text = Vec::new();
+    write_scenarios_to(&mut text, scenarios).unwrap();
+    String::from_utf8(text).unwrap()
+}
+
+fn number(dice: &mut Dice) -> f64 {
+    let any = dice.between(-1e6, 1e6);
+    dice.one_of(&[any, any, -0.0, 0.1 + 0.2, 5e-324, -1e6, 1.0 / 3.0])
+}
+
+fn positive(dice: &mut Dice) -> f64 {
+    let any = dice.between(1e-3, 100.0);
+    dice.one_of(&[any, any, f64::MIN_POSITIVE, 1e6])
+}
+
+fn other(dice: &mut Dice, samples: usize) -> Other {
+    let speed = |dice: &mut Dice| {
+        let any = dice.between(0.0, 80.0);
+        dice.one_of(&[any, any, 0.0, 5e-324])
+    };
+    let (v, y) = (dice.list([samples; 2], speed), dice.list([samples; 2], number));
+    Other { length: positive(dice), width: positive(dice), v, y }
+}
+
+/// Up to so many characters, some of them special to the formats.
+fn text(dice: &mut Dice, max: usize) -> String {
+    const CHARACTERS: [char; 14] =
+        ['a', 'Z', '7', ' ', ',', '"', '\n', '\r', '\\', ';', '\u{1}', 'ü', '\u{202e}', '😀'];
+    dice.list([0, max], |dice| dice.one_of(&CHARACTERS)).into_iter().collect()
+}
+
+fn maybe<T>(dice: &mut Dice, value: impl Fn(&mut Dice) -> T) -> Option<T> {
+    (dice.below(2) == 0).then(|| value(dice))
+}
+
+fn scenario(dice: &mut Dice, id: usize) -> Scenario {
+    let (category, samples) = (dice.one_of(&Category::ALL), 2 + dice.below(38));
+    let has_lead = category == Category::CutOut;
+    // Who is beside the ego or behind it does not lead it.
+    let ahead = |of: Option<f64>| if category == Category::CutIn { of } else { of.map(f64::abs) };
+    let (thw0, kept) = (maybe(dice, number), dice.below(2) == 0);
     Scenario {
-        id: "01_cut_out_5_4_77".into(),
-        category: Category::CutOut,
-        recording: "01".into(),
-        ego_id: 5,
-        target_id: 4,
-        lead_id: Some(3),
-        frame0: 77,
-        frame1: 80,
-        fps: 25.0,
-        kept: true,
-        reason: "lead slower than ego".into(),
-        ego: Ego { v0: 0.1 + 0.2, length: 4.8, width: 1.93 },
-        lane_width: 3.75,
-        side: Side::Right,
-        target: other(0.0),
-        lead: Some(other(-0.1)),
-        thw0: Some(1.0 / 3.0),
-        gap0: Some(31.2),
-        lead_gap: Some(35.68),
-        peak_decel: Some(-0.96),
-        truncated_start: Some(false),
-        end_cause: Some("lc_end".into()),
-        frame_switch: Some(79),
-        tag_frames: Some([77, 81]),
-        synthetic: false,
+        id: format!("s/{id}"),
+        category,
+        recording: text(dice, 8),
+        ego_id: dice.next() as u32,
+        target_id: 7,
+        lead_id: maybe(dice, |dice| dice.next() as u32),
+        frame0: dice.next() as i64,
+        frame1: -1,
+        fps: dice.between(0.1, 1e3),
+        kept,
+        reason: text(dice, 12),
+        ego: Ego { v0: dice.between(0.0, 80.0), length: positive(dice), width: positive(dice) },
+        lane_width: positive(dice),
+        side: dice.one_of(&[Side::Left, Side::Right]),
+        target: other(dice, samples),
+        lead: has_lead.then(|| other(dice, samples)),
+        thw0: ahead(thw0),
+        gap0: ahead(maybe(dice, number)),
+        lead_gap: has_lead.then(|| number(dice).abs()),
+        peak_decel: thw0,
+        truncated_start: maybe(dice, |dice| dice.below(2) == 0),
+        end_cause: maybe(dice, |dice| text(dice, 6)),
+        frame_switch: maybe(dice, |dice| dice.next() as i64),
+        tag_frames: maybe(dice, |dice| [dice.next() as i64, dice.next() as i64]),
+        synthetic: kept,
         replays: Vec::new(),
         fold: None,
     }
@@ -89,22 +129,18 @@ fn what_a_scenario_says_twice_and_differently_is_named() {
 }
 
 #[test]
-fn a_scenario_survives_the_file_to_the_last_bit() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("s.jsonl");
-    let mut lvd = cut_out();
-    (lvd.id, lvd.category, lvd.kept) = ("2".into(), Category::Lvd, false);
-    (lvd.lead, lvd.lead_id, lvd.lead_gap, lvd.thw0, lvd.end_cause) = (None, None, None, None, None);
-    lvd.target.y[1] = -0.0;
-    let all = [cut_out(), lvd];
-    write_scenarios(&path, &all).unwrap();
-    let read = read_scenarios(&path).unwrap();
-    assert_eq!(read, all);
-    assert!(read[1].target.y[1].is_sign_negative());
-    let mut bytes = Vec::new();
-    write_scenarios_to(&mut bytes, &read).unwrap();
-    assert_eq!(bytes, std::fs::read(&path).unwrap());
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary file stays");
+fn a_scenario_survives_every_kind_of_file_to_the_last_bit() {
+    let endings: &[&str] = if cfg!(feature = "parquet") { &["jsonl", "parquet"] } else { &["jsonl"] };
+    cases(60, |dice| {
+        let scenarios: Vec<Scenario> = (0..1 + dice.below(89)).map(|id| scenario(dice, id)).collect();
+        for ending in endings {
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join(format!("s.{ending}"));
+            write_scenarios(&path, &scenarios).unwrap();
+            assert_eq!(text_of(&read_scenarios(&path).unwrap()), text_of(&scenarios), "{ending}");
+            assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary file stays");
+        }
+    });
 }
 
 #[test]
@@ -112,10 +148,10 @@ fn nan_is_never_written_and_a_failed_write_leaves_the_old_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("s.jsonl");
     std::fs::write(&path, "old").unwrap();
-    let mut broken = cut_out();
-    broken.target.y[2] = f64::NAN;
-    let error = write_scenarios(&path, &[cut_out(), broken]).unwrap_err().to_string();
-    assert!(error.contains("target.y[2]") && error.contains("01_cut_out_5_4_77"), "{error}");
+    let mut all = common::mined::scenarios_of(1)[..2].to_vec();
+    all[1].target.y[2] = f64::NAN;
+    let error = write_scenarios(&path, &all).unwrap_err().to_string();
+    assert!(error.contains("target.y[2]") && error.contains(&all[1].id), "{error}");
     assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary file stays");
 }

@@ -2,7 +2,7 @@
 #![cfg(feature = "parquet")]
 
 use crate::common::program::{ran, said};
-use crate::common::tables::made;
+use crate::common::{CASES, made, near};
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -47,22 +47,10 @@ fn a_row_per_instant_makes_scenarios_with_converted_units_and_the_rate_of_their_
     assert_eq!(format!("{read:?}"), format!("{:?}", of("s.csv", &sheet).unwrap()));
 }
 
-const CASES: &str =
-    "id,category,models,ego_speed_kmh,speed_mps,thw,gap,lateral_speed,acceleration,end_speed,ahead_gap,\
-ahead_speed_kmh,duration_s,rate_hz
-a,cut-in,FSM,108,20,1.2,,1.0,,,,,,
-,lvd,RSS,108,30,,30,,-6,0,,,,10
-c,cut-out,FSM,108,,1.2,,1.0,,,40,36,4,
-";
-
 fn before_end(series: &str) -> Vec<f64> {
     let steps: Vec<&str> = series.lines().skip(1).collect();
     let before_end = &steps[..steps.len() - 1];
     before_end.iter().flat_map(|line| line.split(',')).filter_map(|field| field.parse().ok()).collect()
-}
-
-fn near((a, b): (&f64, &f64)) -> bool {
-    a == b || (a - b).abs() <= 1e-6 * (1.0 + a.abs())
 }
 
 #[test]
@@ -86,7 +74,10 @@ fn parameters_make_the_scenarios_that_simulate_runs() {
         assert!(by_row.lines().count() > 20);
         let (x, y) = (before_end(&by_row), before_end(&by_lane));
         let lines = x.len().min(y.len());
-        assert!(lines > 200 && x.iter().zip(&y).take(lines).all(near), "{lane}:\n{by_row}\n{by_lane}");
+        assert!(
+            lines > 200 && x.iter().zip(&y).take(lines).all(|(a, b)| near(*a, *b, 1e-6)),
+            "{lane}:\n{by_row}\n{by_lane}"
+        );
     }
     let study = ran(dir.path(), "-q study --scenarios p.csv --out out --backend cpu");
     assert!(study.contains("cut-in"), "{study}");
@@ -112,7 +103,7 @@ fn a_row_is_the_same_case_in_every_verb_and_ends_its_motions_after_its_duration(
     let (row, lane) = (of(row), of(&format!("{lane} a/S/1.2s/FSM")));
     assert!(row.len() > 200, "{}", row.len());
     assert_eq!(row.len(), lane.len());
-    assert!(row.iter().zip(&lane).all(near));
+    assert!(row.iter().zip(&lane).all(|(a, b)| near(*a, *b, 1e-6)));
 }
 
 fn texts(values: &[&str]) -> ArrayRef {
@@ -150,7 +141,7 @@ fn through(columns: Vec<(&str, ArrayRef)>, compression: Compression) -> laneswee
 }
 
 #[test]
-fn a_table_of_series_with_the_required_columns_is_read_whatever_program_wrote_it() {
+fn a_table_of_series_is_read_whatever_program_wrote_it_or_what_is_wrong_is_told_with_row_scenario_and_column() {
     for compression in [Compression::UNCOMPRESSED, Compression::SNAPPY] {
         let read = through(required_columns(), compression).unwrap();
         let [a, b] = &read[..] else { panic!("two scenarios") };
@@ -158,10 +149,6 @@ fn a_table_of_series_with_the_required_columns_is_read_whatever_program_wrote_it
         assert_eq!((b.category, b.kept, b.lead_id), (Category::Lvd, true, Some(12)));
         assert_eq!(b.target.v, [25.0, 10.0]);
     }
-}
-
-#[test]
-fn what_is_wrong_with_a_table_of_series_is_told_with_row_scenario_and_column() {
     let with = |name: &'static str, array: ArrayRef| {
         let mut columns = required_columns();
         match columns.iter_mut().find(|(known, _)| *known == name) {

@@ -23,39 +23,51 @@ struct Population {
     common: f64,
 }
 
-struct Uniform(ChaCha8Rng);
+pub struct Uniform(pub ChaCha8Rng);
 
 impl Uniform {
-    fn next(&mut self) -> f64 {
+    pub fn new(seed: u64) -> Uniform {
+        Uniform(ChaCha8Rng::seed_from_u64(seed))
+    }
+
+    pub fn next(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
+    /// Headways at which S fails, of a scenario in which it does.
+    pub fn failing(&mut self) -> i32 {
+        1 + (10.0 * self.next() * self.next()) as i32
+    }
+
     /// One or two headways more or fewer.
-    fn shift(&mut self) -> i32 {
+    pub fn shift(&mut self) -> i32 {
         let size = 1 + (2.0 * self.next()) as i32;
         if self.next() < 0.5 { size } else { -size }
     }
 }
 
+/// Of ten headways S and S' fail at the first ones, so many each.
+pub fn confusion(s: i32, s_prime: i32) -> Confusion<u32> {
+    let count = |n: i32| n.max(0) as u32;
+    let (tp, fn_, fp) = (count(s.min(s_prime)), count(s - s_prime), count(s_prime - s));
+    Confusion { tp, fn_, fp, tn: 10 - count(s.max(s_prime)) }
+}
+
 impl Population {
     fn scenario(&self, random: &mut Uniform) -> Vec<Confusion<u32>> {
-        let s = if random.next() < self.failing { 1 + (10.0 * random.next() * random.next()) as i32 } else { 0 };
+        let s = if random.next() < self.failing { random.failing() } else { 0 };
         let (shared, is_shared) = ((random.next(), random.shift()), random.next() < self.common);
-        let count = |n: i32| n.max(0) as u32;
         let counts = |wrong: &f64| {
             let own = (random.next(), random.shift());
             let (chance, shift) = if is_shared { shared } else { own };
             let limit = if s > 0 { *wrong } else { 0.2 * wrong * self.failing };
-            let s_prime = if chance < limit { (s + shift).clamp(0, 10) } else { s };
-            let (tp, fn_, fp) = (count(s.min(s_prime)), count(s - s_prime), count(s_prime - s));
-            Confusion { tp, fn_, fp, tn: 10 - count(s.max(s_prime)) }
+            confusion(s, if chance < limit { (s + shift).clamp(0, 10) } else { s })
         };
         self.wrong.iter().map(counts).collect()
     }
 
-    fn scenarios(&self, n: usize, seed: u64) -> Vec<Vec<Confusion<u32>>> {
-        let mut random = Uniform(ChaCha8Rng::seed_from_u64(seed));
-        (0..n).map(|_| self.scenario(&mut random)).collect()
+    fn scenarios(&self, n: usize, random: &mut Uniform) -> Vec<Vec<Confusion<u32>>> {
+        (0..n).map(|_| self.scenario(random)).collect()
     }
 
     /// Least F1 of the better less the largest of the others.
@@ -70,7 +82,11 @@ impl Population {
     fn truth(&self) -> f64 {
         // Equals do not differ; of a finite sample they would.
         let is_one = self.wrong.iter().all(|wrong| *wrong == self.wrong[0]);
-        if is_one { 0.0 } else { self.difference(self.scenarios(400_000, 1).iter()).expect("failures") }
+        if is_one {
+            0.0
+        } else {
+            self.difference(self.scenarios(400_000, &mut Uniform::new(1)).iter()).expect("failures")
+        }
     }
 
     fn ours(&self, scenarios: &[Vec<Confusion<u32>>]) -> ScoreInterval {
@@ -114,7 +130,7 @@ fn intervals_of_differences_hold() {
                 let population = Population { failing, wrong: wrong.clone(), better, common };
                 let truth = population.truth();
                 let of = |repeat: u64| {
-                    let scenarios = population.scenarios(n, 1000 + repeat);
+                    let scenarios = population.scenarios(n, &mut Uniform::new(1000 + repeat));
                     let failing = scenarios.iter().filter(|scenario| fails(scenario)).count();
                     (failing >= MIN_FAILING).then(|| population.ours(&scenarios))
                 };
@@ -134,8 +150,8 @@ fn intervals_of_differences_hold() {
 /// A claim about twelve cells of one study: four drivers that fail the more often the more careless, three criteria of which
 /// one failure often brings the next. The cells share their scenarios.
 fn claim(population: &Population, n: usize, seed: u64) -> ClaimVerdict {
-    let mut random = Uniform(ChaCha8Rng::seed_from_u64(seed));
-    let scenarios: Vec<Vec<Confusion<u32>>> = (0..n).map(|_| population.scenario(&mut random)).collect();
+    let mut random = Uniform::new(seed);
+    let scenarios = population.scenarios(n, &mut random);
     // A harder criterion and a more careful driver fail in fewer of the same scenarios.
     let mut cell = |at: u32| {
         let kept = 1.0 - 0.07 * f64::from(at);

@@ -1,25 +1,17 @@
 //! Densities: what published programs give, what must hold of any, and the way from a scenario to a point and to a case.
 
-use crate::common;
 use crate::common::mined::{self, scenarios_of};
+use crate::common::{golden_json, near, numbers, with_threads};
 
-use lanesweep::scenario::parameterization::{
-    Family, Parameterization, ParameterizationOptions, Reduction, Sizes, SvdLateral, Variable,
-};
-use lanesweep::scenario::{Case, Category, DataProvenance, Driven, Lateral, Scenario, Side};
+use lanesweep::prelude::*;
+use lanesweep::scenario::parameterization::{Family, ParameterizationOptions, Reduction, Sizes, SvdLateral, Variable};
+use lanesweep::scenario::{Case, DataProvenance, Driven, Lateral, Side};
 use lanesweep::stats::density::{
-    Bandwidth, BandwidthRule, DensityModel, FitOptions, Kde, LeaveOneOut, ParameterSpace, SearchEnd, ValidFraction,
-    normal_cdf, read_density, write_density,
+    Bandwidth, BandwidthRule, Kde, LeaveOneOut, ParameterSpace, SearchEnd, ValidFraction, normal_cdf,
 };
 use lanesweep::stats::random::Stream;
 use rayon::prelude::*;
 use serde_json::Value;
-
-fn golden(name: &str) -> Value {
-    // Python writes infinities, which JSON does not know; they are the scores that underflow.
-    let text = std::fs::read_to_string(common::golden(name)).unwrap().replace("-Infinity", "null");
-    serde_json::from_str(&text).unwrap()
-}
 
 /// Probability of the box between two corners. Infinite bounds are allowed.
 fn probability(kde: &Kde, lower: &[f64], upper: &[f64]) -> f64 {
@@ -31,20 +23,12 @@ fn probability(kde: &Kde, lower: &[f64], upper: &[f64]) -> f64 {
     kde.points().iter().map(inside).sum::<f64>() / kde.points().len() as f64
 }
 
-fn numbers(value: &Value) -> Vec<f64> {
-    serde_json::from_value(value.clone()).unwrap()
-}
-
-fn rows(value: &Value) -> Vec<Vec<f64>> {
-    serde_json::from_value(value.clone()).unwrap()
-}
-
 fn number(value: &Value) -> f64 {
     value.as_f64().unwrap()
 }
 
 fn assert_near(ours: f64, theirs: f64, tolerance: f64, what: &str) {
-    assert!((ours - theirs).abs() <= tolerance * (1.0 + theirs.abs()), "{what}: {ours} instead of {theirs}");
+    assert!(near(ours, theirs, tolerance), "{what}: {ours} instead of {theirs}");
 }
 
 fn names(d: usize) -> Vec<&'static str> {
@@ -59,12 +43,11 @@ fn with_bandwidth(points: Vec<Vec<f64>>, scale: Vec<f64>, value: f64) -> Kde {
 
 #[test]
 fn scale_bandwidth_density_and_probabilities_are_those_of_the_published_program() {
-    let golden = golden("kde.json");
-    for case in golden["cases"].as_array().unwrap() {
-        let data = rows(&case["data"]);
+    for case in golden_json("kde.json")["cases"].as_array().unwrap() {
+        let data: Vec<Vec<f64>> = numbers(&case["data"]);
         let (n, d) = (data.len(), data[0].len());
         let wide = Kde::fit(data.clone(), &names(d), BandwidthRule::Wide).unwrap();
-        for (ours, theirs) in wide.scale().iter().zip(numbers(&case["std_used"])) {
+        for (ours, theirs) in wide.scale().iter().zip(numbers::<f64>(&case["std_used"])) {
             assert_near(*ours, theirs, 1e-9, "scale");
         }
         let silverman = number(&case["silverman"]);
@@ -97,8 +80,8 @@ fn scale_bandwidth_density_and_probabilities_are_those_of_the_published_program(
         let theirs = with_bandwidth(data, wide.scale().to_vec(), number(&case["bandwidth_default"]));
         let mixture = theirs.mixture().unwrap();
         let mut sum = 0.0;
-        let queries = rows(&case["query"]);
-        let golden = numbers(&case["density"]).into_iter().zip(numbers(&case["cdf"]));
+        let queries: Vec<Vec<f64>> = numbers(&case["query"]);
+        let golden = numbers::<f64>(&case["density"]).into_iter().zip(numbers::<f64>(&case["cdf"]));
         for (x, (density, cdf)) in queries.iter().zip(golden) {
             let log_density = mixture.log_density(x);
             assert!((log_density.exp() / density - 1.0).abs() < 1e-9, "density {} {density}", log_density.exp());
@@ -116,7 +99,7 @@ fn scale_bandwidth_density_and_probabilities_are_those_of_the_published_program(
 
 #[test]
 fn draws_have_the_moments_of_the_density_and_any_part_can_be_drawn_alone() {
-    let data = rows(&golden("kde.json")["cases"][2]["data"]);
+    let data: Vec<Vec<f64>> = numbers(&golden_json("kde.json")["cases"][2]["data"]);
     let kde = Kde::fit(data.clone(), &names(3), BandwidthRule::Wide).unwrap();
     let stream = Stream { seed: 157, purpose: 2 };
     let n = 200_000;
@@ -144,11 +127,8 @@ fn the_bits_of_a_fit_do_not_depend_on_the_number_of_threads() {
     let stream = Stream { seed: 5, purpose: 5 };
     let source = with_bandwidth(vec![vec![0.0, 10.0], vec![3.0, -4.0]], vec![1.0, 2.0], 1.0);
     let points = (0..2000).map(|index| source.draw(&stream, index)).collect::<Vec<_>>();
-    let fit = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| Kde::fit(points.clone(), &names(2), BandwidthRule::Wide).unwrap())
-    };
-    let (one, three) = (fit(1), fit(3));
+    let fit = || Kde::fit(points.clone(), &names(2), BandwidthRule::Wide).unwrap();
+    let (one, three) = (with_threads(1, fit), with_threads(3, fit));
     assert_eq!(one, three);
     let bits = |kde: &Kde| kde.mixture().unwrap().log_density(&[1.0, 1.0]).to_bits();
     assert_eq!(bits(&one), bits(&three));

@@ -2,13 +2,11 @@
 
 use crate::common::mined::{self, provenance, scenarios_of};
 
-use lanesweep::model::profile::Profile;
+use lanesweep::prelude::*;
 use lanesweep::run::sampling::{SAMPLE_PURPOSE, generator_of};
 use lanesweep::scenario::parameterization::{
-    Parameterization, ParameterizationOptions, ReducedScenario, Reduction, SeriesScale, SvdBasis, SvdLateral, fit_svd,
+    ParameterizationOptions, ReducedScenario, Reduction, SeriesScale, SvdBasis, SvdLateral, fit_svd,
 };
-use lanesweep::scenario::{Category, Scenario};
-use lanesweep::stats::density::{DensityModel, FitOptions};
 use lanesweep::stats::random::Stream;
 
 fn kept(category: Category) -> Vec<&'static Scenario> {
@@ -37,18 +35,17 @@ fn distances(reduced: &ReducedScenario, category: Category) -> (f64, f64) {
 }
 
 #[test]
-fn every_draw_starts_and_ends_in_the_lanes_of_its_category_and_drives_at_a_speed_within_physics() {
+fn every_draw_starts_and_ends_in_the_lanes_of_its_category_and_densities_of_one_side_lose_few() {
     let profile = Profile::load("paper").unwrap();
     for id in Parameterization::ALL.into_iter().filter(|id| id.coefficients().is_some()) {
-        for svd_lateral in [SvdLateral::Signed, SvdLateral::Mirrored] {
+        let [both, one] = [SvdLateral::Signed, SvdLateral::Mirrored].map(|svd_lateral| {
             let density = density(id, options(svd_lateral));
             let stream = Stream { seed: 7, purpose: SAMPLE_PURPOSE };
             let generator = generator_of(&density.space, &density.kde, &density.sizes, &profile, stream).unwrap();
             for index in 0..2000 {
                 let drawn = generator.draw(index);
-                let point: Vec<f64> =
-                    drawn.values[..density.space.dimensions()].iter().map(|&v| f64::from(v)).collect();
-                let reduced = density.space.reduced(&point).unwrap();
+                let point = &drawn.values[..density.space.dimensions()];
+                let reduced = density.space.reduced(&point.iter().map(|&v| f64::from(v)).collect::<Vec<_>>()).unwrap();
                 let what = format!("{} {svd_lateral:?}, draw {index}", id.name());
                 assert!(!drawn.is_void() && reduced.v[0] <= 100.0 && reduced.v_ego <= 100.0, "{what}");
                 if id.category != Category::Lvd {
@@ -58,19 +55,12 @@ fn every_draw_starts_and_ends_in_the_lanes_of_its_category_and_drives_at_a_speed
                     assert!(inside <= 1.7501, "{what}: {inside} m inside");
                 }
             }
+            misplaced(&density)
+        });
+        if id.category != Category::Lvd {
+            eprintln!("{}: {:.2} % signed, {:.2} % mirrored", id.name(), 100.0 * both, 100.0 * one);
+            assert!(one < 0.02 && both > 2.0 * one && both > 0.02, "{}: {both} and {one}", id.name());
         }
-    }
-}
-
-#[test]
-fn densities_of_one_side_lose_few_draws_and_those_of_both_sides_many() {
-    for id in Parameterization::ALL.into_iter().filter(|id| id.coefficients().is_some() && id.category != Category::Lvd)
-    {
-        let [both, one] = [SvdLateral::Signed, SvdLateral::Mirrored].map(|s| density(id, options(s)));
-        let (both, one) = (misplaced(&both), misplaced(&one));
-        eprintln!("{}: {:.2} % signed, {:.2} % mirrored", id.name(), 100.0 * both, 100.0 * one);
-        assert!(one < 0.02, "{}: {one}", id.name());
-        assert!(both > 2.0 * one && both > 0.02, "{}: {both} and {one}", id.name());
     }
     assert_eq!(FitOptions::default().parameterization, options(SvdLateral::Mirrored));
     // Refused draws are counted by the bound that they break.

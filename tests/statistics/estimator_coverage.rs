@@ -13,6 +13,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
 
+use super::claim_coverage::{Uniform, confusion};
 use crate::common::reliability::{
     StandardNormal, adaptive, four_branch, four_branch_probability, linear, tail, unit_mixture,
 };
@@ -140,33 +141,24 @@ fn adaptive_importance_sampling_intervals_hold() {
 /// Draws of a scenario: hardness is Φ(μ + σZ), which has the mean Φ(μ/√(1 + σ²)).
 fn sampled_scenarios(n: usize, [mean, spread]: [f64; 2], seed: u64) -> (Vec<u64>, Vec<u64>) {
     const DRAWS: u64 = 4000;
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let mut uniform = || (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
-    let hardness: Vec<f64> = (0..n).map(|_| tail(-(mean + spread * normal_quantile(uniform().max(1e-12))))).collect();
+    let mut random = Uniform::new(seed);
+    let hardness: Vec<f64> =
+        (0..n).map(|_| tail(-(mean + spread * normal_quantile(random.next().max(1e-12))))).collect();
     let (mut runs, mut failures) = (vec![0; n], vec![0; n]);
     for _ in 0..DRAWS {
-        let kernel = (uniform() * n as f64) as usize;
+        let kernel = (random.next() * n as f64) as usize;
         runs[kernel] += 1;
-        failures[kernel] += u64::from(uniform() < hardness[kernel]);
+        failures[kernel] += u64::from(random.next() < hardness[kernel]);
     }
     (runs, failures)
 }
 
 /// Lanes in which S, S' and either of them fail, of one scenario.
-fn confusion(random: &mut ChaCha8Rng, failing: f64, wrong: f64) -> Confusion<u32> {
-    let mut uniform = || (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
-    let s = if uniform() < failing { 1 + (uniform() * uniform() * 10.0) as i32 } else { 0 };
-    let shift = 1 + (uniform() * 2.0) as i32;
-    let shift = if uniform() < 0.5 { shift } else { -shift };
-    let is_wrong = uniform() < if s > 0 { wrong } else { 0.2 * wrong * failing };
-    let s_prime = if is_wrong { (s + shift).clamp(0, 10) } else { s };
-    let count = |n: i32| n.max(0) as u32;
-    Confusion {
-        tp: count(s.min(s_prime)),
-        fn_: count(s - s_prime),
-        fp: count(s_prime - s),
-        tn: count(10 - s.max(s_prime)),
-    }
+fn scenario(random: &mut Uniform, failing: f64, wrong: f64) -> Confusion<u32> {
+    let s = if random.next() < failing { random.failing() } else { 0 };
+    let shift = random.shift();
+    let is_wrong = random.next() < if s > 0 { wrong } else { 0.2 * wrong * failing };
+    confusion(s, if is_wrong { (s + shift).clamp(0, 10) } else { s })
 }
 
 fn percentiles(n: usize, seed: u64, of: impl Fn(&[usize]) -> Option<f64>) -> Option<(f64, f64)> {
@@ -227,13 +219,13 @@ fn intervals_of_f1_hold() {
                     units.iter().for_each(|unit| sum.add(unit));
                     sum
                 };
-                let mut random = ChaCha8Rng::seed_from_u64(1);
-                let population: Vec<Confusion<u32>> =
-                    (0..200_000).map(|_| confusion(&mut random, failing, wrong)).collect();
-                let truth = f1(&total(&population)).expect("failures");
+                let drawn = |n: usize, seed: u64| -> Vec<Confusion<u32>> {
+                    let mut random = Uniform::new(seed);
+                    (0..n).map(|_| scenario(&mut random, failing, wrong)).collect()
+                };
+                let truth = f1(&total(&drawn(200_000, 1))).expect("failures");
                 let of = |seed: u64| {
-                    let mut random = ChaCha8Rng::seed_from_u64(1000 + seed);
-                    let units: Vec<Confusion<u32>> = (0..n).map(|_| confusion(&mut random, failing, wrong)).collect();
+                    let units = drawn(n, 1000 + seed);
                     // None where S fails in fewer than ten scenarios.
                     let ours = f1_interval(units.iter(), &ScoreOptions::default())?;
                     let score = |drawn: &[usize]| f1(&total(&drawn.iter().map(|at| units[*at]).collect::<Vec<_>>()));

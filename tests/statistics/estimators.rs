@@ -9,6 +9,7 @@ use lanesweep::stats::estimate::{
 use crate::common::reliability::{
     StandardNormal, adaptive, four_branch, four_branch_probability, importance, linear, tail, two_sided, unit_mixture,
 };
+use crate::common::{golden_json, numbers, with_threads};
 
 /// At most so many draws of the density, in the search and again beside the final draws.
 const CRUDE: u64 = 1_000_000;
@@ -25,12 +26,8 @@ fn close(got: f64, expected: f64) -> bool {
 
 #[test]
 fn the_author_s_estimates_are_reproduced() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/importance_sampling.json");
-    let text = std::fs::read_to_string(path).expect("the golden file");
-    let golden: serde_json::Value = serde_json::from_str(&text).expect("JSON");
-    let column = |table: &str, k: usize| -> Vec<f64> {
-        golden[table][k].as_array().expect("a column").iter().map(|v| v.as_f64().expect("a number")).collect()
-    };
+    let golden = golden_json("importance_sampling.json");
+    let column = |table: &str, k: usize| -> Vec<f64> { numbers(&golden[table][k]) };
     let number = |path: &str| golden.pointer(path).and_then(|v| v.as_f64()).expect("a number");
     let of = |table: &str, ratio: &dyn Fn(usize) -> f64, response: &dyn Fn(usize) -> f64| -> WeightSums {
         let tries = column(table, 1);
@@ -69,7 +66,7 @@ fn the_author_s_estimates_are_reproduced() {
 }
 
 #[test]
-fn sums_of_a_proposal_are_the_same_bits_in_any_division_of_the_indices() {
+fn sums_of_a_proposal_are_the_same_bits_in_any_division_of_the_indices_and_a_search_with_one_thread() {
     let density = StandardNormal { dimensions: 2 };
     let proposal = Mixture::of_kernels(vec![vec![2.0, 2.0]], &[0.7, 0.7]).unwrap();
     let options = Importance { seed: 9, draws: 20_000, crude_per_draw: 3 };
@@ -79,16 +76,28 @@ fn sums_of_a_proposal_are_the_same_bits_in_any_division_of_the_indices() {
     parts.merge(of(0..123)).unwrap();
     parts.merge(of(123..7001)).unwrap();
     assert_eq!(parts, whole);
-    let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    assert_eq!(one_thread.install(|| of(0..20_000)), whole);
+    assert_eq!(with_threads(1, || of(0..20_000)), whole);
+    let search = || found(&StandardNormal { dimensions: 4 }, &linear(4.0), 8);
+    assert_eq!(with_threads(1, search), search());
+}
+
+/// Of the first question, within a fraction of the truth.
+fn assert_found(
+    what: &str,
+    density: &dyn Density,
+    limit_state: &dyn LimitState,
+    seed: u64,
+    (truth, by): (f64, f64),
+) -> Estimate {
+    let estimate = found(density, limit_state, seed).0.remove(0);
+    assert!((estimate.probability / truth - 1.0).abs() < by, "{what}: {estimate:?} beside {truth}");
+    estimate
 }
 
 #[test]
 fn a_search_finds_the_linear_limit_s_probability_in_any_dimension() {
     for (beta, dimensions) in [(2.0, 2), (3.5, 5), (5.0, 10)] {
-        let (estimates, _) = found(&StandardNormal { dimensions }, &linear(beta), 3);
-        let estimate = &estimates[0];
-        assert!((estimate.probability / tail(beta) - 1.0).abs() < 0.15, "{estimate:?}");
+        let estimate = assert_found("linear", &StandardNormal { dimensions }, &linear(beta), 3, (tail(beta), 0.15));
         // A million draws of the density do not exclude other failures of a probability below 3.7e-6.
         let is_bounded = tail(beta) > 7.4e-6;
         assert_eq!(estimate.trust.draws() == Verdict::Sound, is_bounded, "{estimate:?}");
@@ -134,9 +143,7 @@ fn failures_in_the_tails_do_not_hide_more_likely_ones() {
     };
     let truth = tail(4.2) + tail(6.0);
     for seed in 0..2 {
-        let (estimates, _) = found(&StandardNormal { dimensions: 2 }, &pocket, seed);
-        let estimate = &estimates[0];
-        assert!((estimate.probability / truth - 1.0).abs() < 0.3, "{seed}: {estimate:?}");
+        assert_found("pocket", &StandardNormal { dimensions: 2 }, &pocket, seed, (truth, 0.3));
     }
 }
 
@@ -163,16 +170,8 @@ fn one_search_answers_several_questions_with_the_same_draws() {
 }
 
 #[test]
-fn a_search_has_the_same_bits_with_one_thread() {
-    let of = || found(&StandardNormal { dimensions: 4 }, &linear(4.0), 8);
-    let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    assert_eq!(one_thread.install(of), of());
-}
-
-#[test]
 fn a_truncated_density_is_searched_within_its_valid_region() {
     let half = Truncated::with_validity(unit_mixture(2), |x: &[f64]| x[1] > 0.0, 0.5).unwrap();
-    let (estimates, _) = found(&half, &linear(4.0), 4);
     // x₀ + x₁ > 4√2 with x₁ > 0: most of the tail, twice its density.
     let truth = {
         let (steps, width) = (200_000, 12.0 / 200_000.0);
@@ -180,7 +179,7 @@ fn a_truncated_density_is_searched_within_its_valid_region() {
         let of = |i: i32| (f64::from(i) + 0.5) * width;
         2.0 * (0..steps).map(|i| density(of(i)) * tail(4.0 * std::f64::consts::SQRT_2 - of(i)) * width).sum::<f64>()
     };
-    assert!((estimates[0].probability / truth - 1.0).abs() < 0.15, "{:?} beside {truth}", estimates[0]);
+    assert_found("half", &half, &linear(4.0), 4, (truth, 0.15));
 }
 
 #[test]

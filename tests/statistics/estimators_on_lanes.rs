@@ -2,21 +2,14 @@
 //! `cargo test --release --test library estimators_on_lanes:: -- --ignored --nocapture`
 
 use crate::common;
-use crate::common::mined::{provenance, scenarios};
+use crate::common::mined::{provenance, scenarios_of};
 use crate::common::reliability::adaptive;
 
 use std::path::PathBuf;
 
-use lanesweep::engine::{CpuBackend, Executor, Headway};
-use lanesweep::model::criterion::Criterion;
-use lanesweep::model::driver::ModelId;
-use lanesweep::model::profile::Profile;
-use lanesweep::run::sampling::{Estimator, LaneLimitState, Question, Sample, SampleHeadways, SampleOptions, truncated};
-use lanesweep::scenario::parameterization::Parameterization;
-use lanesweep::scenario::{Category, Scenario};
-use lanesweep::stats::density::{DensityModel, FitOptions, read_density};
+use lanesweep::prelude::*;
+use lanesweep::run::sampling::{Estimator, LaneLimitState, Question, truncated};
 use lanesweep::stats::estimate::{Estimate, Goal, Search, Verdict, wilson};
-use lanesweep::traffic::mining::{MiningOptions, mine_folder};
 
 const LEVEL: f64 = 0.999;
 
@@ -123,7 +116,7 @@ fn the_book_s_own_case_is_held_whichever_kernel_the_search_finds() {
 
 #[test]
 fn importance_sampling_agrees_with_crude_monte_carlo_on_lanes() {
-    compare("default data", scenarios(), Category::CutIn, "1", 6_000_000);
+    compare("default data", scenarios_of(24), Category::CutIn, "1", 3_000_000);
 }
 
 #[test]
@@ -132,7 +125,7 @@ fn its_interval_holds_what_a_hundred_million_lanes_resolve() {
     let mined =
         |dir: PathBuf| mine_folder(&dir, &MiningOptions::default(), Default::default(), || Ok(())).unwrap().scenarios;
     let samples = 100_000_000;
-    compare("default data", scenarios(), Category::CutIn, "2", samples);
+    compare("default data", scenarios_of(24), Category::CutIn, "2", samples);
     if let Some(dir) = common::sumo_recordings() {
         compare("SUMO", &mined(dir), Category::Lvd, "i", samples);
     }

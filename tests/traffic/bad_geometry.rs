@@ -3,10 +3,9 @@
 use crate::common::exid::Plain;
 use crate::common::small::{self, Texts, cruising};
 
-use lanesweep::Error;
 use lanesweep::model::plausibility::Implausible;
-use lanesweep::traffic::trajectory::highd;
-use lanesweep::traffic::trajectory::{Recording, Track};
+use lanesweep::prelude::*;
+use lanesweep::traffic::trajectory::{Track, highd};
 
 /// Ten vehicles in five lanes of both directions, 2.4 s; each sways across its lane.
 fn traffic() -> Recording {
@@ -29,23 +28,15 @@ fn traffic() -> Recording {
 /// The recording with a column of `tracks` made anew from its value and the height of the box.
 fn changed(texts: &Texts, column: &str, change: impl Fn(f64, f64) -> f64) -> Texts {
     let mut tracks = Plain::of_text(&texts.tracks);
-    let at = tracks.at(column);
-    for row in 0..tracks.rows.len() {
-        let [value, height] = [column, "height"].map(|name| tracks.number(row, name));
-        tracks.rows[row][at] = format!("{:.2}", change(value, height));
-    }
+    let height = tracks.at("height");
+    tracks.map(column, |value, row| change(value, row[height].parse().unwrap()));
     Texts { tracks: tracks.text(), ..texts.clone() }
 }
 
 #[test]
-fn good_geometry_says_nothing() {
+fn a_mirrored_axis_and_a_wrong_reference_point_are_refused_and_good_geometry_says_nothing() {
     let texts = Texts::of(&traffic());
     assert_eq!(texts.read_checked(Implausible::Refused).unwrap().notes, [""; 0]);
-}
-
-#[test]
-fn a_mirrored_axis_and_a_wrong_reference_point_are_refused() {
-    let texts = Texts::of(&traffic());
     let y_with = |part: f64| changed(&texts, "y", |y, height| y + part * height);
     let cases: [(&str, Texts, &[&str]); 7] = [
         ("upside down", changed(&texts, "y", |y, _| -y), &["mirrored"]),

@@ -1,12 +1,13 @@
 //! Traffic as public reports describe it: what stands, overlaps, is there twice or was rounded gives the scenarios of plain traffic.
 
 use std::fmt::Write as _;
-use std::path::Path;
 
-use lanesweep::model::plausibility::Implausible;
 use lanesweep::scenario::{Category, Scenario, problem_of, write_scenarios};
-use lanesweep::traffic::Source;
-use lanesweep::traffic::mining::{Collection, MiningOptions};
+use lanesweep::traffic::mining::Collection;
+
+use crate::common::mined;
+use crate::common::quintic;
+use crate::traffic::tracks::load_collection as load;
 
 /// Length, width, and where the middle of the box is at a time.
 type Vehicle = ([f64; 2], Box<dyn Fn(f64) -> [f64; 2]>);
@@ -20,10 +21,7 @@ fn steady(x: f64, v: f64, y: f64) -> Vehicle {
 }
 
 fn across(from: f64, to: f64, begin: f64, end: f64) -> impl Fn(f64) -> f64 {
-    move |t| {
-        let part = ((t - begin) / (end - begin)).clamp(0.0, 1.0);
-        from + (to - from) * part.powi(3) * (10.0 - 15.0 * part + 6.0 * part * part)
-    }
+    move |t| from + (to - from) * quintic((t - begin) / (end - begin))
 }
 
 /// Twelve seconds as a table; `time` writes a time, `y` changes the lateral positions, `lane` names the lane of a position.
@@ -48,15 +46,7 @@ fn plain(vehicles: &[Vehicle]) -> String {
     table(vehicles, 10.0, &|k| format!("{},", k as f64 / 10.0), &|_| "")
 }
 
-fn load(path: &Path) -> Collection {
-    let source = match path.extension() {
-        Some(ending) if ending == "jsonl" => Source::Scenarios { path: path.to_owned(), filter: false },
-        _ => Source::Recordings { path: path.to_owned(), preset: None },
-    };
-    source.load(&MiningOptions::default(), Implausible::Refused, || Ok(())).unwrap()
-}
-
-fn mined(text: &str) -> Collection {
+fn mine(text: &str) -> Collection {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("own.csv");
     std::fs::write(&path, text).unwrap();
@@ -64,7 +54,7 @@ fn mined(text: &str) -> Collection {
 }
 
 fn kept(found: &Collection, category: Category) -> Vec<&Scenario> {
-    found.scenarios.iter().filter(|of| of.category == category && of.kept).collect()
+    mined::kept(&found.scenarios, category)
 }
 
 fn says(found: &Collection, words: &str) -> bool {
@@ -88,22 +78,19 @@ fn cut_out(v: f64, is_divided: bool) -> Vec<Vehicle> {
 
 #[test]
 fn what_stands_or_reverses_belongs_to_the_lanes_that_it_is_in() {
-    let plus = mined(&plain(&cut_out(1e-4, false)));
+    let plus = mine(&plain(&cut_out(1e-4, false)));
     let [expected] = kept(&plus, Category::CutOut)[..] else { panic!("{:?}", plus.scenarios) };
     assert!((20.0..45.0).contains(&expected.lead_gap.unwrap()) && expected.lane_width == 3.5);
     for (v, is_divided) in [(-1e-4, false), (0.0, true), (-1e-4, true)] {
-        let found = mined(&plain(&cut_out(v, is_divided)));
+        let found = mine(&plain(&cut_out(v, is_divided)));
         let [one] = kept(&found, Category::CutOut)[..] else { panic!("{v}, {is_divided}: {:?}", found.scenarios) };
         assert!((one.lead_gap.unwrap() - expected.lead_gap.unwrap()).abs() < 2e-3 && one.lane_width == 3.5);
         assert!(!says(&found, "lane width"), "{:?}", found.notes);
     }
-    let reversing = mined(&plain(&cut_out(-2.0, false)));
+    let reversing = mine(&plain(&cut_out(-2.0, false)));
     assert!(kept(&reversing, Category::CutOut).is_empty());
-    assert!(
-        says(&reversing, "1 vehicles drive backwards") && reversing.recordings[0].vehicles == 4,
-        "{:?}",
-        reversing.notes
-    );
+    assert!(says(&reversing, "1 vehicles drive backwards"), "{:?}", reversing.notes);
+    assert_eq!(reversing.recordings[0].vehicles, 4);
 }
 
 #[test]
@@ -120,10 +107,10 @@ fn a_vehicle_beside_the_ego_does_not_lead_it() {
         two.into_iter().chain((2..7).map(|n| steady(-100.0 * f64::from(n), 25.0, 5.25))).collect::<Vec<_>>()
     };
     for (gap, expected) in [(0.5, 1), (-1.0, 0)] {
-        let found = mined(&plain(&pair(gap)));
+        let found = mine(&plain(&pair(gap)));
         assert_eq!(kept(&found, Category::Lvd).len(), expected, "{gap}: {:?}", found.scenarios);
     }
-    let found = mined(&plain(&pair(0.5)));
+    let found = mine(&plain(&pair(0.5)));
     let mut scenario = found.scenarios[0].clone();
     assert_eq!(problem_of(&scenario), None);
     scenario.gap0 = Some(-0.5);
@@ -180,14 +167,10 @@ fn times_within_half_a_digit_of_a_raster_are_on_it() {
         (30.0, jitter),
     ];
     for (at, (rate, time)) in cases.iter().enumerate() {
-        let found = mined(&table(&all, *rate, &|k| time(k, *rate), &|_| ""));
+        let found = mine(&table(&all, *rate, &|k| time(k, *rate), &|_| ""));
         let [one] = &found.scenarios[..] else { panic!("{at}: {:?}", found.notes) };
         let peak = one.peak_decel.unwrap();
-        assert!(
-            (peak - 1.9).abs() < 0.05 && (one.ego.v0 - 34.0).abs() < 0.01 && !one.kept,
-            "{at}: {peak}, {}",
-            one.ego.v0
-        );
+        assert!((peak - 1.9).abs() < 0.05 && (one.ego.v0 - 34.0).abs() < 0.01 && !one.kept, "{at}: {one:?}");
         assert!((one.fps / rate - 1.0).abs() < 1e-3 && !says(&found, "interpolated"), "{at}: {:?}", found.notes);
     }
 }
@@ -208,7 +191,7 @@ fn a_road_with_a_ramp_has_the_same_lanes() {
         (true, _) => "e1_1",
         (false, _) => "e2_2",
     };
-    let found = mined(&table(&all, 10.0, &|k| format!("{},", k as f64 / 10.0), &lane));
+    let found = mine(&table(&all, 10.0, &|k| format!("{},", k as f64 / 10.0), &lane));
     let [one] = &found.scenarios[..] else { panic!("{:?}", found.scenarios) };
     assert!((one.lane_width - 3.5).abs() < 0.02, "{}", one.lane_width);
 }

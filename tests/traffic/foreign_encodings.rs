@@ -6,11 +6,11 @@ use std::path::Path;
 
 use lanesweep::model::plausibility::Implausible;
 use lanesweep::traffic::trajectory::highd;
-use lanesweep::traffic::trajectory::tracks::{self, Preset, TrackFile};
+use lanesweep::traffic::trajectory::tracks::{Preset, TrackFile};
 use lanesweep::traffic::trajectory::{InputFile, Inputs, Recording};
 
 use crate::common::exid::Plain;
-use crate::traffic::tracks::generated;
+use crate::traffic::tracks::{fact, generated, understood};
 
 fn table() -> Plain {
     let mut recording = generated();
@@ -117,9 +117,10 @@ fn compressed_highd_files_are_read() {
 }
 
 #[test]
-fn times_in_any_notation_are_the_same_times() {
+fn times_in_any_notation_are_the_same_times_what_they_are_taken_for_is_said_and_midnight_is_refused() {
     let right = from_frame_0(read("own.csv", table().text().as_bytes()).unwrap());
-    let clock = |t: f64| format!("{:02}:{:02}:{:05.2}", 8 + (t / 3600.0) as u32, (t / 60.0) as u32 % 60, t % 60.0);
+    let of_day = |t: f64| format!("{:02}:{:02}:{:05.2}", (t / 3600.0) as u32, (t / 60.0) as u32 % 60, t % 60.0);
+    let clock = |t: f64| of_day(t + 8.0 * 3600.0);
     let notations: [(&str, &dyn Fn(f64) -> String); 6] = [
         ("milliseconds", &|t| format!("{:.0}", 1_740_823_200_000.0 + 1000.0 * t)),
         ("microseconds", &|t| format!("{:.0}", 1_740_823_200_000_000.0 + 1e6 * t)),
@@ -133,25 +134,10 @@ fn times_in_any_notation_are_the_same_times() {
         assert_eq!(found.frame_rate_hz, right.frame_rate_hz, "{name}");
         assert!(found == right, "{name}");
     }
-}
-
-#[test]
-fn what_a_time_without_a_unit_is_taken_for_is_said() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("own.csv");
-    fs::write(&path, with_times(|t| format!("{:.0}", 1_740_823_200_000.0 + 1000.0 * t)).text()).unwrap();
-    let generic = Preset::load("generic").unwrap();
-    let read = tracks::read_tracks(&TrackFile { path, id: "own".to_owned() }, &generic).unwrap();
-    let about = &read[0].understanding;
-    assert!(crate::traffic::tracks::fact(about, "columns").contains("time = t (ms since 1970)"), "{:?}", about.facts);
-}
-
-#[test]
-fn times_of_day_that_pass_midnight_are_refused() {
-    let evening = |t: f64| {
-        let of_day = (t + 86_390.0) % 86_400.0;
-        format!("{:02}:{:02}:{:05.2}", (of_day / 3600.0) as u32, (of_day / 60.0) as u32 % 60, of_day % 60.0)
-    };
+    let about = understood(&with_times(notations[0].1)).unwrap();
+    assert!(fact(&about, "columns").contains("time = t (ms since 1970)"), "{:?}", about.facts);
+    // Times of day that pass midnight.
+    let evening = |t: f64| of_day((t + 86_390.0) % 86_400.0);
     let error = read("own.csv", with_times(evening).text().as_bytes()).unwrap_err().to_string();
     assert!(error.contains("midnight") && error.contains("line "), "{error}");
 }
@@ -183,39 +169,26 @@ fn geographic_coordinates_are_named_as_such() {
 #[cfg(feature = "parquet")]
 #[test]
 fn parquet_with_gzip_or_lz4_and_microseconds_is_the_table_and_instants_are_refused() {
-    use std::sync::Arc;
-
-    use arrow_array::{ArrayRef, Float64Array, Int64Array, StringArray, TimestampMicrosecondArray};
+    use arrow_array::cast::AsArray;
+    use arrow_array::types::{Int64Type, TimestampMicrosecondType};
     use parquet::basic::{Compression, GzipLevel};
 
-    let table = table();
-    let right = from_frame_0(read("own.csv", table.text().as_bytes()).unwrap());
-    let column = |name: &String, are_instants: bool| -> ArrayRef {
-        let at = table.at(name);
-        let texts = || table.rows.iter().map(move |row| row[at].as_str());
-        let numbers = || texts().map(|text| text.parse::<f64>().unwrap());
-        match name.as_str() {
-            "class" | "track_id" => Arc::new(StringArray::from_iter_values(texts())),
-            "t" => {
-                let instants = numbers().map(|t| 1_740_823_200_000_000 + (1e6 * t).round() as i64);
-                match are_instants {
-                    true => Arc::new(TimestampMicrosecondArray::from_iter_values(instants)),
-                    false => Arc::new(Int64Array::from_iter_values(instants)),
-                }
-            }
-            _ => Arc::new(Float64Array::from_iter_values(numbers())),
-        }
-    };
+    let right = from_frame_0(read("own.csv", table().text().as_bytes()).unwrap());
+    let text = with_times(|t| format!("{}", 1_740_823_200_000_000 + (1e6 * t).round() as i64)).text();
+    let mut columns = crate::traffic::tracks::columns(&text, &["track_id", "t"]);
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("own.parquet");
+    let through = |columns, codec| {
+        crate::common::made::write(&path, columns, codec);
+        read("own.parquet", &fs::read(&path).unwrap())
+    };
     let gzip = Compression::GZIP(GzipLevel::default());
     for codec in [gzip, Compression::LZ4, Compression::LZ4_RAW, Compression::SNAPPY] {
-        let columns = table.header.iter().map(|name| (name.as_str(), column(name, false))).collect();
-        crate::common::tables::made::write(&path, columns, codec);
-        assert!(from_frame_0(read("own.parquet", &fs::read(&path).unwrap()).unwrap()) == right, "{codec:?}");
+        assert!(from_frame_0(through(columns.clone(), codec).unwrap()) == right, "{codec:?}");
     }
-    let columns = table.header.iter().map(|name| (name.as_str(), column(name, true))).collect();
-    crate::common::tables::made::write(&path, columns, gzip);
-    let error = read("own.parquet", &fs::read(&path).unwrap()).unwrap_err();
+    let (_, times) = columns.iter_mut().find(|(name, _)| name == "t").unwrap();
+    let instants = times.as_primitive::<Int64Type>().reinterpret_cast::<TimestampMicrosecondType>();
+    *times = std::sync::Arc::new(instants);
+    let error = through(columns, gzip).unwrap_err();
     assert!(error.help().unwrap().contains("a time to int64"), "{error:?}");
 }

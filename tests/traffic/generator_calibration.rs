@@ -5,15 +5,11 @@ mod traffic;
 use std::sync::LazyLock;
 
 use crate::common::mined::recordings;
-use lanesweep::engine::{CpuBackend, Executor};
-use lanesweep::model::profile::Profile;
-use lanesweep::run::parts::Job;
+use lanesweep::prelude::*;
 use lanesweep::run::score::published_failures;
-use lanesweep::run::study::Study;
-use lanesweep::scenario::{Category, Scenario};
-use lanesweep::traffic::mining::{Mined, MiningOptions, mine, mine_generated};
-use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate};
-use lanesweep::traffic::trajectory::{Recording, VehicleClass};
+use lanesweep::traffic::mining::{Mined, mine};
+use lanesweep::traffic::trajectory::VehicleClass;
+use lanesweep::traffic::trajectory::generator::generate;
 use rayon::prelude::*;
 use traffic::{Traffic, class_index, mean, measure, mode, noise_sd_and_correlation, quantile, share};
 
@@ -50,10 +46,6 @@ impl Table {
         self.row(figure, &format!("{published:.4}"), ours, low * published, high * published);
     }
 
-    fn finish(self) {
-        self.finish_but(&[]);
-    }
-
     /// Every figure lies in its span but these, which docs/src/validation.md, "The generator", lists.
     fn finish_but(self, known: &[&str]) {
         let figures: Vec<&str> = self.outside.iter().map(|(figure, _)| figure.as_str()).collect();
@@ -63,7 +55,7 @@ impl Table {
 }
 
 struct Counted {
-    recordings: &'static [Recording],
+    recordings: Vec<&'static Recording>,
     sets: f64,
     scenarios: Vec<Scenario>,
 }
@@ -74,7 +66,7 @@ impl Counted {
         &COUNTED
     }
 
-    fn of(recordings: &'static [Recording]) -> Counted {
+    fn of(recordings: Vec<&'static Recording>) -> Counted {
         let mined: Vec<Mined> = recordings.par_iter().map(|r| mine(r, &MiningOptions::default())).collect();
         let sets = mined.iter().map(|m| m.data_sets).sum::<u64>() as f64;
         Counted { recordings, sets, scenarios: mined.into_iter().flat_map(|m| m.scenarios).collect() }
@@ -106,7 +98,7 @@ impl Counted {
     }
 
     fn traffic(&self, options: &GeneratorOptions) -> Traffic {
-        measure(self.recordings, options.duration_s, options.window_m)
+        measure(&self.recordings, options.duration_s, options.window_m)
     }
 }
 
@@ -140,7 +132,7 @@ fn the_default_recordings_look_like_published_motorway_traffic() {
     let (sd, correlation_s) = noise_sd_and_correlation(&generate(&quiet).unwrap());
     table.row("acceleration noise on an empty road, sd, m/s²", "0.20 – 0.24", sd, 0.2, 0.24);
     table.row("its correlation time, s", "1.5", correlation_s, 1.3, 1.7);
-    table.finish();
+    table.finish_but(&[]);
 }
 
 #[test]
@@ -159,13 +151,13 @@ fn lane_changes_and_cut_ins_look_as_published() {
     table.row("THW at cut-in, mode, s", "0.8 – 1.0", mode(headways, 0.2), 0.75, 1.1);
     table.row("THW at cut-in, share below 0.5 s", "0.04", share(headways, |h| h < 0.5), 0.025, 0.055);
     table.row("THW at cut-in, share 0.5 – 2.5 s", "bulk", share(headways, |h| (0.5..2.5).contains(&h)), 0.65, 0.9);
-    table.finish();
+    table.finish_but(&[]);
 }
 
 #[test]
 fn at_rate_factor_one_scenarios_are_as_frequent_as_published() {
     let options = GeneratorOptions { event_rate_factor: 1.0, recordings: 36, ..GeneratorOptions::default() };
-    let counted = Counted::of(generate(&options).unwrap().leak());
+    let counted = Counted::of(generate(&options).unwrap().leak().iter().collect());
     let t = counted.traffic(&options);
     let mut table = Table::new("Rates at rate factor 1 (36 recordings)");
     let crossings = t.crossings as f64 / t.driven_km;

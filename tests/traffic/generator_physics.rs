@@ -1,6 +1,7 @@
 //! The synthetic recordings are physically possible, well-formed, and the same everywhere.
 
 use crate::common::mined::recordings;
+use crate::common::with_threads;
 use lanesweep::support::plain_text::hex;
 use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate, generate_one};
 use lanesweep::traffic::trajectory::{Recording, Track};
@@ -11,7 +12,7 @@ use sha2::{Digest, Sha256};
 /// and then on purpose: every published default result changes with it.
 const DEFAULT_DIGEST: &str = "e070e1fefac703b2c818b9e4919b5b2b06d73352db96732935e6f188b82739f8";
 
-fn digest(recordings: &[Recording]) -> String {
+fn digest<'r>(recordings: impl IntoIterator<Item = &'r Recording>) -> String {
     let mut hash = Sha256::new();
     for recording in recordings {
         hash.update(recording.id.as_bytes());
@@ -37,9 +38,8 @@ fn digest(recordings: &[Recording]) -> String {
 
 #[test]
 fn the_default_recordings_are_the_same_bits_on_every_machine_and_thread_count() {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     let options = GeneratorOptions { recordings: 2, ..GeneratorOptions::default() };
-    let one = pool.install(|| generate(&options).unwrap());
+    let one = with_threads(1, || generate(&options).unwrap());
     assert_eq!(digest(&one), digest(recordings(2)), "one thread and all threads differ");
     assert_eq!(digest(recordings(12)), DEFAULT_DIGEST, "the default recordings have changed");
 }
@@ -85,12 +85,11 @@ fn no_two_vehicles_overlap() {
                     let (p, q) = (a.index_of(frame as i64).unwrap(), b.index_of(frame as i64).unwrap());
                     let along = (a.s_m[p] - b.s_m[q]).abs() - 0.5 * (a.length_m + b.length_m);
                     let across = (a.d_m[p] - b.d_m[q]).abs() - 0.5 * (a.width_m + b.width_m);
+                    let is_apart = a.carriageway != b.carriageway || along > 0.0 || across > 0.0;
                     assert!(
-                        a.carriageway != b.carriageway || along > 0.0 || across > 0.0,
-                        "{} frame {frame}: {} and {} overlap by {along:.2} m and {across:.2} m",
-                        recording.id,
-                        a.id,
-                        b.id
+                        is_apart,
+                        "{}, frame {frame}: {} and {} overlap by {along}, {across} m",
+                        recording.id, a.id, b.id
                     );
                 }
             }

@@ -5,6 +5,7 @@ use crate::common;
 use std::fs;
 
 use crate::common::dice::{Dice, cases};
+use crate::common::exid::Plain;
 use crate::common::small;
 use lanesweep::traffic::trajectory::highd;
 use lanesweep::traffic::trajectory::{Carriageway, Loaded, NO_LANE, Recording, Track, VehicleClass};
@@ -129,8 +130,9 @@ fn the_checksum_is_the_sha_256_of_the_whole_file() {
     assert_eq!(loaded.checksum_sha256[2].sha256, "88e3d2e2d572562aa604405e09046eb88c878d2f92c2f2f68623bcb201c383b0");
 }
 
+/// Columns may come in any order, and only the needed ones need to be there.
 #[test]
-fn windows_line_ends_a_byte_order_mark_and_blank_lines_change_nothing() {
+fn line_ends_a_byte_order_mark_blank_lines_and_the_order_of_columns_change_nothing() {
     let texts = small::Texts::small();
     let plain = texts.read().unwrap();
     let windows = |text: &str| text.replace('\n', "\r\n");
@@ -155,27 +157,15 @@ fn windows_line_ends_a_byte_order_mark_and_blank_lines_change_nothing() {
         assert_eq!(bits(&loaded.recording), bits(&plain.recording));
         assert_eq!(loaded.notes, plain.notes);
     }
-}
-
-#[test]
-fn columns_may_come_in_any_order_and_only_the_needed_ones_need_to_be_there() {
-    let texts = small::Texts::small();
-    let mut lines = texts.tracks.clone();
-    for column in ["width", "height", "yAcceleration", "dhw", "thw", "ttc", "precedingId", "leftAlongsideId"] {
-        lines = small::without_column(&lines, column);
-    }
-    let backwards: String =
-        lines.lines().map(|line| line.split(',').rev().collect::<Vec<_>>().join(",") + "\n").collect();
-    let reordered = small::Texts { tracks: backwards, ..texts.clone() };
-    assert_eq!(reordered.read().unwrap().recording, texts.read().unwrap().recording);
-}
-
-#[test]
-fn without_lane_ids_the_geometry_tells_the_lanes_and_a_note_says_so() {
-    let texts = small::Texts::small();
-    let without = small::Texts { tracks: small::without_column(&texts.tracks, "laneId"), ..texts.clone() };
-    let loaded = without.read().unwrap();
-    assert_eq!(loaded.recording, texts.read().unwrap().recording);
+    let without = |columns: &[&str]| Plain::of_text(&texts.tracks).without(columns);
+    let read = |tracks: Plain| small::Texts { tracks: tracks.text(), ..texts.clone() }.read().unwrap();
+    let unneeded = ["width", "height", "yAcceleration", "dhw", "thw", "ttc", "precedingId", "leftAlongsideId"];
+    let mut backwards = without(&unneeded);
+    std::iter::once(&mut backwards.header).chain(&mut backwards.rows).for_each(|row| row.reverse());
+    assert_eq!(read(backwards).recording, plain.recording);
+    // Without lane ids the geometry tells the lanes, and a note says so.
+    let loaded = read(without(&["laneId"]));
+    assert_eq!(loaded.recording, plain.recording);
     assert!(loaded.notes[0].contains("laneId"), "{:?}", loaded.notes);
 }
 
@@ -216,6 +206,17 @@ fn announced_vehicles_without_frames_are_left_out_and_strange_ones_are_noted() {
     assert!(notes.iter().all(|note| note.contains("vehicle 5")), "{notes:?}");
 }
 
+/// Except inside the very last number: nothing tells 12 from 1 there.
+#[test]
+fn wherever_the_last_line_is_cut_the_file_is_called_truncated() {
+    let texts = small::Texts::small();
+    for cut in 3..=texts.tracks.lines().last().unwrap().len() {
+        let tracks = texts.tracks[..texts.tracks.len() - cut].to_owned();
+        let error = small::Texts { tracks, ..texts.clone() }.read().unwrap_err();
+        assert!(format!("{error} {:?}", error.help()).contains("trunc"), "{cut}: {error}");
+    }
+}
+
 #[test]
 fn a_recording_that_the_format_cannot_hold_is_refused_and_nothing_is_written() {
     type Spoil<'a> = &'a dyn Fn(&mut Recording);
@@ -245,10 +246,8 @@ fn a_recording_that_the_format_cannot_hold_is_refused_and_nothing_is_written() {
 fn every_sumo_recording_reads_and_its_written_form_reads_alike() {
     let Some(dir) = common::sumo_recordings() else { return };
     let inventory = highd::inventory(&dir).unwrap();
-    assert_eq!(
-        inventory.recordings.iter().map(|files| files.id.as_str()).collect::<Vec<_>>(),
-        ["01", "02", "03", "04"]
-    );
+    let ids: Vec<&str> = inventory.recordings.iter().map(|files| files.id.as_str()).collect();
+    assert_eq!(ids, ["01", "02", "03", "04"]);
     // Numbers from recordingMeta: vehicles, lanes above, lanes below.
     let expected = [(349, 3, 3), (222, 2, 2), (439, 3, 3), (376, 3, 4)];
     for (files, (vehicles, upper, lower)) in inventory.recordings.iter().zip(expected) {

@@ -1,6 +1,6 @@
 //! The detectors and the search against golden tables: other implementations of the published text.
 
-use crate::common;
+use crate::common::{golden_json, numbers};
 
 use lanesweep::traffic::mining::lateral::{LaneChangeKind, lane_changes};
 use lanesweep::traffic::mining::longitudinal::{Longitudinal, longitudinal_events};
@@ -10,13 +10,7 @@ use lanesweep::traffic::trajectory::Lane;
 use serde_json::Value;
 
 fn cases(name: &str) -> Vec<Value> {
-    let text = std::fs::read_to_string(common::golden(name)).unwrap();
-    let golden: Value = serde_json::from_str(&text).unwrap();
-    golden["cases"].as_array().unwrap().clone()
-}
-
-fn numbers(value: &Value) -> Vec<f64> {
-    value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
+    golden_json(name)["cases"].as_array().unwrap().clone()
 }
 
 /// `[[time, tag], …]` in samples.

@@ -1,6 +1,7 @@
 //! What the miner must do with traffic whose every event is known, because it was put there.
 
 use crate::common::dice::{Dice, cases};
+use crate::common::quintic;
 use lanesweep::scenario::{Category, Scenario, Side};
 use lanesweep::traffic::mining::lateral::{LaneChangeKind, lane_changes};
 use lanesweep::traffic::mining::longitudinal::{Longitudinal, longitudinal_events};
@@ -45,8 +46,7 @@ impl Car {
         let (changed, after) = ((t.min(until) - from).max(0.0), (t - until).max(0.0));
         let dv = a * changed;
         let s = self.s0_m + self.v0_mps * t + 0.5 * dv * changed + dv * after;
-        let p = ((t - self.changes.0) / (self.changes.1 - self.changes.0)).clamp(0.0, 1.0);
-        let share = p * p * p * (10.0 - 15.0 * p + 6.0 * p * p);
+        let share = quintic((t - self.changes.0) / (self.changes.1 - self.changes.0));
         let d = self.from_m + share * (self.to_m - self.from_m);
         (s, d, self.v0_mps + dv, if from <= t && t < until { a } else { 0.0 })
     }
@@ -112,7 +112,7 @@ fn cut_out_before(lead: Car) -> [Car; 3] {
 }
 
 #[test]
-fn a_slower_vehicle_that_cuts_in_closely_is_found_and_kept() {
+fn a_slower_vehicle_that_cuts_in_closely_is_found_and_kept_from_either_side() {
     let s = only(&cut_in_from(LEFT), Category::CutIn);
     assert!(s.kept, "{}", s.reason);
     assert_eq!((s.side, s.truncated_start, s.end_cause.as_deref()), (Side::Left, Some(false), Some("lc_end")));
@@ -125,13 +125,10 @@ fn a_slower_vehicle_that_cuts_in_closely_is_found_and_kept() {
     assert_eq!(s.target.v.len() as i64, s.frame1 - s.frame0 + 1);
     let gap = 45.0 - 3.0 * start_s - LENGTH_M;
     assert!((s.gap0.unwrap() - gap).abs() < 0.011 && (s.thw0.unwrap() - s.gap0.unwrap() / 30.0).abs() < 1e-12);
-}
-
-#[test]
-fn a_cut_in_from_the_other_side_is_its_mirror_image() {
-    let (left, right) = (only(&cut_in_from(LEFT), Category::CutIn), only(&cut_in_from(RIGHT), Category::CutIn));
+    // From the other side it is its mirror image.
+    let right = only(&cut_in_from(RIGHT), Category::CutIn);
     assert_eq!(right.side, Side::Right);
-    assert_eq!(Scenario { side: Side::Left, ..right }, left);
+    assert_eq!(Scenario { side: Side::Left, ..right }, s);
 }
 
 #[test]

@@ -3,18 +3,16 @@
 use std::sync::OnceLock;
 
 use lanesweep::model::plausibility::Implausible;
-use lanesweep::scenario::Category;
-use lanesweep::traffic::mining::{MiningOptions, count, mine, mine_loaded};
-use lanesweep::traffic::trajectory::Recording;
-use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
+use lanesweep::prelude::*;
+use lanesweep::traffic::mining::{count, mine, mine_loaded};
 
 use crate::common::exid::Plain;
+use crate::traffic::tracks::{read_by, shorter, understood};
 
 /// Generated traffic, whose positions are the integrals of its speeds.
 fn recording() -> Recording {
     let made = || {
-        let options = GeneratorOptions { recordings: 1, duration_s: 120.0, ..GeneratorOptions::default() };
-        let mut recording = generate_one(&options, 0).unwrap();
+        let mut recording = shorter();
         for track in &mut recording.tracks {
             for k in 1..track.len() {
                 track.s_m[k] = track.s_m[k - 1] + 0.5 * (track.v_s_mps[k - 1] + track.v_s_mps[k]) / 25.0;
@@ -37,7 +35,7 @@ fn rounded(mut table: Plain, columns: &[&str], step: f64) -> Plain {
 
 /// Kept leader decelerations of a table, and the notes on noise.
 fn mined(table: &Plain, smoothing_s: Option<f64>) -> (u64, Vec<String>) {
-    let read = crate::traffic::tracks::read(table, &|preset| preset.smoothing_s = smoothing_s).unwrap();
+    let read = read_by(table, &|preset| preset.smoothing_s = smoothing_s).unwrap();
     let graves: Vec<_> = read.understanding.findings.iter().filter(|finding| finding.is_grave).collect();
     assert!(graves.is_empty(), "{graves:?}");
     let (_, mut found) = mine_loaded(&read.loaded, &MiningOptions::default(), Implausible::Refused);
@@ -92,6 +90,6 @@ fn one_speed_per_vehicle_is_refused() {
         track.v_d_mps.fill(0.0);
     }
     let table = Plain::of(&recording, 5).without(&["heading", "vx", "vy"]);
-    let found = crate::traffic::tracks::understood(&table, &|_| ()).unwrap().findings;
+    let found = understood(&table).unwrap().findings;
     assert!(found.iter().any(|of| of.is_grave && of.text.contains("one speed per vehicle")), "{found:?}");
 }

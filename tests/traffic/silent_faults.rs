@@ -1,17 +1,13 @@
 //! Faulty recordings of which every number is plausible: what was wrong with them is said, and nothing is said of good ones.
 
-use std::path::Path;
-
 use lanesweep::model::plausibility::Implausible;
-use lanesweep::traffic::Source;
-use lanesweep::traffic::mining::{Collection, MiningOptions};
 use lanesweep::traffic::trajectory::highd;
 use lanesweep::traffic::trajectory::tracks::Understanding;
 use lanesweep::traffic::trajectory::{InputFile, Recording, Track, VehicleClass};
 
 use crate::common::exid::Plain;
 use crate::common::small::Texts;
-use crate::traffic::tracks::{generated, says, understood};
+use crate::traffic::tracks::{generated, load_collection, says, understood};
 
 fn highd_understood(recording: &Recording) -> Understanding {
     let (dir, mut recording) = (tempfile::tempdir().unwrap(), recording.clone());
@@ -115,6 +111,10 @@ fn faults_of_a_recording_are_told() {
         let is_told = says(&about, &format!("{way}: vehicles move 0.909 times"));
         assert!(is_told || !about.is_usable(), "{way}: {:?}", about.findings);
     }
+    // Good recordings are told none of it.
+    for about in [highd_understood(&generated()), understood(&Plain::of(&generated(), 5)).unwrap()] {
+        assert!(WORDS.iter().all(|words| !says(&about, words)), "{:?}", about.findings);
+    }
 }
 
 /// Positions in whole metres, and a road in Web Mercator at 51 degrees: without speeds nothing else tells the scale.
@@ -123,22 +123,13 @@ fn coarse_positions_and_stretched_roads_are_told() {
     for (raster_m, is_coarse) in [(1.0, true), (0.1, false)] {
         let mut table = Plain::of(&generated(), 1);
         table.map("x", |x, _| (x / raster_m).round() * raster_m);
-        let about = understood(&table, &|_| ()).unwrap();
+        let about = understood(&table).unwrap();
         assert_eq!(says(&about, "are multiples of 1.00 m"), is_coarse, "{raster_m}: {:?}", about.findings);
     }
     let mut table = Plain::of(&generated(), 5).without(&["speed", "vx", "vy"]);
     ["x", "y"].iter().for_each(|axis| table.map(axis, |m, _| 1.589 * m));
-    let about = understood(&table, &|_| ()).unwrap();
+    let about = understood(&table).unwrap();
     assert!(says(&about, "m wide (median; 2.7 to 4.6 is usual)"), "{:?}", about.findings);
-}
-
-#[test]
-fn good_recordings_are_told_none_of_it() {
-    let recording = generated();
-    let all = [highd_understood(&recording), understood(&Plain::of(&recording, 5), &|_| ()).unwrap()];
-    for about in all {
-        assert!(WORDS.iter().all(|words| !says(&about, words)), "{:?}", about.findings);
-    }
 }
 
 #[test]
@@ -181,9 +172,9 @@ fn two_places_in_one_table_are_told_or_parted() {
         row.push("south".to_owned());
         table.rows.push(row);
     }
-    let about = understood(&table, &|_| ()).unwrap();
+    let about = understood(&table).unwrap();
     assert!(about.recording == "own-north" && !says(&about, "no vehicle drives between"), "{:?}", about.findings);
-    let about = understood(&table.without(&["site"]), &|_| ()).unwrap();
+    let about = understood(&table.without(&["site"])).unwrap();
     assert!(says(&about, "no vehicle drives between"), "{:?}", about.findings);
     // One after the other.
     let recording = generated();
@@ -193,7 +184,7 @@ fn two_places_in_one_table_are_told_or_parted() {
     for (by_m, is_told) in [(1.5, true), (6.0, true), (0.1, false)] {
         let mut table = Plain::of(&recording, 5);
         table.map("y", |y, row| if late.contains(&row[0]) { y + by_m } else { y });
-        let about = understood(&table, &|_| ()).unwrap();
+        let about = understood(&table).unwrap();
         assert_eq!(says(&about, "drive elsewhere across the road"), is_told, "{by_m}: {:?}", about.findings);
     }
 }
@@ -206,7 +197,7 @@ fn a_table_as_long_as_a_spreadsheet_may_be_cut() {
         Plain::of_text(&text)
     };
     for (lines, is_told) in [(65_536, true), (1_048_576, true), (65_535, false)] {
-        let about = understood(&text(lines), &|_| ()).unwrap();
+        let about = understood(&text(lines)).unwrap();
         assert_eq!(says(&about, &format!("{lines} lines, as many as a spreadsheet can hold")), is_told);
     }
 }
@@ -227,11 +218,6 @@ fn sizes_of_other_vehicles_are_refused_with_both_files_named() {
     let notes = with_sizes_of(&|row| if row == odd { row + 1 } else { row }).unwrap().notes;
     assert!(notes.iter().any(|note| note.starts_with("1 vehicle(s) have two sizes")), "{notes:?}");
     assert_eq!(with_sizes_of(&|row| row).unwrap().notes, [""; 0]);
-}
-
-fn load(folder: &Path) -> Collection {
-    let source = Source::Recordings { path: folder.to_owned(), preset: None };
-    source.load(&MiningOptions::default(), Implausible::Refused, || Ok(())).unwrap()
 }
 
 /// The frames of a recording in an interval, with other numbers of vehicles and frames.
@@ -261,7 +247,7 @@ fn a_part_of_a_recording_under_other_numbers_counts_once() {
     let driven = |recordings: &[Recording]| {
         let dir = tempfile::tempdir().unwrap();
         recordings.iter().for_each(|recording| highd::write(dir.path(), recording).unwrap());
-        let found = load(dir.path());
+        let found = load_collection(dir.path());
         let problems: Vec<String> = found.problems.iter().map(ToString::to_string).collect();
         (found.driven().unwrap(), problems)
     };

@@ -2,13 +2,13 @@
 
 use std::fmt::Write as _;
 use std::fs;
-use std::path::Path;
 
 use lanesweep::model::plausibility::Implausible;
 use lanesweep::scenario::{Category, read_scenario_file, write_scenarios};
 use lanesweep::traffic::mining::{Collection, MiningOptions, mine_folder, mine_inputs};
 use lanesweep::traffic::trajectory::{Inputs, Track, VehicleClass};
 
+use crate::common::text_of;
 use crate::traffic::tracks::load;
 
 const LANE_WIDTH_M: f64 = 3.5;
@@ -72,10 +72,6 @@ fn fcd(vehicles: &[Driven], change_s: f64) -> String {
     format!("{header}\n0.00;;;;;;;;;\n") + &samples(vehicles, 14, change_s).iter().map(row).collect::<String>()
 }
 
-fn gap_m(ego: &Track, lead: &Track) -> f64 {
-    lead.s_m[0] - ego.s_m[0] - 0.5 * (ego.length_m + lead.length_m)
-}
-
 #[test]
 fn the_gap_behind_a_truck_of_sumo_is_measured_from_its_front_bumper() {
     let dir = tempfile::tempdir().unwrap();
@@ -85,7 +81,8 @@ fn the_gap_behind_a_truck_of_sumo_is_measured_from_its_front_bumper() {
     let recording = load(&path).unwrap().remove(0).recording;
     let [truck, car] = &recording.tracks[..] else { panic!("{:?}", recording.tracks.len()) };
     assert_eq!(truck.class, VehicleClass::Truck);
-    assert!((gap_m(car, truck) - 35.9).abs() < 1e-9, "{}", gap_m(car, truck));
+    let gap_m = truck.s_m[0] - car.s_m[0] - 0.5 * (car.length_m + truck.length_m);
+    assert!((gap_m - 35.9).abs() < 1e-9, "{gap_m}");
 }
 
 #[test]
@@ -250,9 +247,9 @@ fn scenarios_have_the_frames_and_the_names_of_vehicles_of_their_file() {
     assert_eq!(stepped.id, format!("t_cut_in_f.1_f.2_{}", stepped.frame0));
     assert_eq!((stepped.fps, &stepped.target), (plain.fps, &plain.target));
     // The same where the preset has the rate, and no time is needed.
-    let generic = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/presets/generic.toml");
     let own = dir.path().join("own.toml");
-    let with_rate = fs::read_to_string(generic).unwrap().replacen("[classes]", "frame_rate_hz = 30.0\n\n[classes]", 1);
+    let generic = text_of("configs/presets/generic.toml");
+    let with_rate = generic.replacen("[classes]", "frame_rate_hz = 30.0\n\n[classes]", 1);
     fs::write(&own, with_rate).unwrap();
     fs::write(&path, table(1000, 3).replace("id,frame,time", "id,frame,ignored")).unwrap();
     let frames = cut_in_by(own.to_str());

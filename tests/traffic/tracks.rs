@@ -4,24 +4,25 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use lanesweep::model::plausibility::Implausible;
-use lanesweep::scenario::{Category, Scenario};
-use lanesweep::traffic::mining::{MiningOptions, mine};
-use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
-use lanesweep::traffic::trajectory::highd;
+use lanesweep::prelude::*;
+use lanesweep::traffic::Source;
+use lanesweep::traffic::mining::mine;
+use lanesweep::traffic::trajectory::generator::generate_one;
 use lanesweep::traffic::trajectory::tracks::{
     self, HeadingOrigin, LoadedTracks, Preset, Reference, RoadSource, Role, Side, TrackFile, Understanding,
 };
-use lanesweep::traffic::trajectory::{Carriageway, Inputs, Loaded, NO_LANE, Recording, Track, VehicleClass};
+use lanesweep::traffic::trajectory::{Carriageway, Inputs, Loaded, NO_LANE, Track, VehicleClass, highd};
 
 use crate::common::exid::{self, Plain};
 use crate::common::mined::recordings;
+use crate::common::quintic;
 
 pub fn generated() -> Recording {
-    recordings(1)[0].clone()
+    Recording::clone(recordings(1)[0])
 }
 
 /// Two minutes of it.
-fn shorter() -> Recording {
+pub fn shorter() -> Recording {
     generate_one(&GeneratorOptions { recordings: 1, duration_s: 120.0, ..GeneratorOptions::default() }, 0).unwrap()
 }
 
@@ -33,29 +34,30 @@ pub fn load(path: &Path) -> lanesweep::Result<Vec<Loaded>> {
     Ok(read?.into_iter().flatten().collect())
 }
 
+/// The scenarios of a file, or of the recordings of a file or folder.
+pub fn load_collection(path: &Path) -> Collection {
+    let path = path.to_owned();
+    let source = match path.extension() {
+        Some(ending) if ending == "jsonl" => Source::Scenarios { path, filter: false },
+        _ => Source::Recordings { path, preset: None },
+    };
+    source.load(&MiningOptions::default(), Implausible::Refused, || Ok(())).unwrap()
+}
+
 fn load_exid(dir: &Path) -> Loaded {
     let detected = Inputs::of(dir, None).unwrap().preset().map(|preset| preset.name.clone());
     assert_eq!(detected.as_deref(), Some("exid"));
     load(dir).unwrap().remove(0)
 }
 
-fn by_vehicles(scenarios: Vec<Scenario>) -> BTreeMap<(Category, u32, u32), Vec<Scenario>> {
-    let mut all: BTreeMap<(Category, u32, u32), Vec<Scenario>> = BTreeMap::new();
-    for scenario in scenarios {
-        all.entry((scenario.category, scenario.ego_id, scenario.target_id)).or_default().push(scenario);
-    }
-    all
-}
-
 /// Number of scenarios, of those that another reading has within some frames, and of those whose `kept` is equal.
 fn matched(ours: &Recording, theirs: &Recording, shift: i64, frames: i64) -> [usize; 3] {
-    let options = MiningOptions::default();
-    let (ours, theirs) = (mine(ours, &options).scenarios, by_vehicles(mine(theirs, &options).scenarios));
+    let [ours, theirs] = [ours, theirs].map(|of| mine(of, &MiningOptions::default()).scenarios);
     let mut counts = [ours.len(), 0, 0];
+    let who = |of: &Scenario| (of.category, of.ego_id, of.target_id);
     for scenario in ours {
-        let near = theirs
-            .get(&(scenario.category, scenario.ego_id, scenario.target_id))
-            .and_then(|list| list.iter().find(|other| (other.frame0 + shift - scenario.frame0).abs() <= frames));
+        let is_near = |other: &Scenario| (other.frame0 + shift - scenario.frame0).abs() <= frames;
+        let near = theirs.iter().find(|other| who(other) == who(&scenario) && is_near(other));
         counts[1] += usize::from(near.is_some());
         counts[2] += usize::from(near.is_some_and(|other| other.kept == scenario.kept));
     }
@@ -115,10 +117,7 @@ fn merging() -> Recording {
     }
     // From a ramp onto the acceleration lane, along it, and into the right lane.
     add(30, 25.0, 24.0, &|s| {
-        let step = |from: f64, to: f64| {
-            let part = ((s - from) / (to - from)).clamp(0.0, 1.0);
-            part * part * part * (10.0 - 15.0 * part + 6.0 * part * part)
-        };
+        let step = |from: f64, to: f64| quintic((s - from) / (to - from));
         -17.0 + 7.625 * step(0.0, 120.0) + 3.75 * step(220.0, 320.0)
     });
     Recording { id: "ramp".to_owned(), frame_rate_hz: 25.0, carriageways: vec![lanes], tracks, synthetic: true }
@@ -136,9 +135,13 @@ fn merging_from_an_on_ramp_of_a_curved_road_is_a_cut_in() {
     assert_eq!(cut_in.map(|s| s.ego_id), Some(11), "{:?}", mined.scenarios.iter().map(|s| &s.id).collect::<Vec<_>>());
 }
 
-/// What is understood of a table under the generic preset, changed.
-pub fn understood(table: &Plain, change: &dyn Fn(&mut Preset)) -> lanesweep::Result<Understanding> {
-    read(table, change).map(|read| read.understanding)
+/// What is understood of a table under the generic preset.
+pub fn understood(table: &Plain) -> lanesweep::Result<Understanding> {
+    read(table).map(|read| read.understanding)
+}
+
+pub fn read(table: &Plain) -> lanesweep::Result<LoadedTracks> {
+    read_by(table, &|_| ())
 }
 
 pub fn fact<'a>(about: &'a Understanding, name: &str) -> &'a str {
@@ -150,7 +153,7 @@ pub fn says(about: &Understanding, words: &str) -> bool {
 }
 
 /// A table under the generic preset, changed.
-pub fn read(table: &Plain, change: &dyn Fn(&mut Preset)) -> lanesweep::Result<LoadedTracks> {
+pub fn read_by(table: &Plain, change: &dyn Fn(&mut Preset)) -> lanesweep::Result<LoadedTracks> {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("own.csv");
     std::fs::write(&path, table.text()).unwrap();
@@ -163,7 +166,7 @@ pub fn read(table: &Plain, change: &dyn Fn(&mut Preset)) -> lanesweep::Result<Lo
 #[test]
 fn a_plain_table_is_understood_and_nothing_is_wrong_with_it() {
     let table = Plain::of(&generated(), 5);
-    let about = understood(&table, &|_| ()).unwrap();
+    let about = understood(&table).unwrap();
     assert!(about.is_usable(), "{:?}", about.findings);
     assert_eq!(fact(&about, "rate"), "5 Hz, from the times");
     assert!(fact(&about, "road").starts_with("straight"));
@@ -172,9 +175,18 @@ fn a_plain_table_is_understood_and_nothing_is_wrong_with_it() {
     assert!(fact(&about, "speeds").starts_with("0 tracks from positions, 0 across"), "{:?}", about.facts);
     // Without speeds, headings and sizes too, but it is said.
     let bare = table.without(&["heading", "speed", "vx", "vy", "length", "width", "class"]);
-    let about = understood(&bare, &|_| ()).unwrap();
+    let about = understood(&bare).unwrap();
     assert!(about.is_usable() && !fact(&about, "speeds").starts_with("0 "), "{:?}", about.findings);
     assert!(says(&about, "have no size"));
+}
+
+/// The corner of the box in place of its middle.
+fn of_corners(mut table: Plain) -> Plain {
+    for (axis, size) in [("x", "length"), ("y", "width")] {
+        let at = table.at(size);
+        table.map(axis, |v, row| v - 0.5 * row[at].parse::<f64>().unwrap());
+    }
+    table
 }
 
 #[test]
@@ -193,19 +205,11 @@ fn wrong_units_axes_and_reference_points_are_found() {
         ("y flipped, two directions", with(bare(), &|t| t.map("y", |v, _| -v)), "mirrored"),
         ("radians for degrees", with(table.clone(), &|t| t.map("heading", |v, _| v.to_radians())), "heading"),
         ("north for x", with(table.clone(), &|t| t.map("heading", |v, _| 90.0 - v)), "heading"),
-        (
-            "a corner for the centre",
-            with(bare(), &|t| {
-                let (length, width) = (t.at("length"), t.at("width"));
-                t.map("x", |v, row| v - 0.5 * row[length].parse::<f64>().unwrap());
-                t.map("y", |v, row| v - 0.5 * row[width].parse::<f64>().unwrap());
-            }),
-            "",
-        ),
+        ("a corner for the centre", of_corners(bare()), ""),
         ("a wrong time unit", with(bare(), &|t| t.map("t", |v, _| 1000.0 * v)), ""),
     ];
     for (name, table, expected) in cases {
-        let words = match understood(&table, &|_| ()) {
+        let words = match understood(&table) {
             Err(error) => format!("{error} {}", error.help().unwrap_or_default()),
             Ok(about) => {
                 assert!(!about.is_usable(), "{name} was not found: {:?}", about.findings);
@@ -225,7 +229,7 @@ fn wrong_units_axes_and_reference_points_are_found() {
     one_way.rows.iter_mut().for_each(|row| "car".clone_into(&mut row[class]));
     one_way.map("length", |_, _| 4.5);
     one_way.map("y", |v, _| -v);
-    let about = understood(&one_way, &|_| ()).unwrap();
+    let about = understood(&one_way).unwrap();
     assert!(about.findings.iter().any(|finding| finding.text.contains("mirrored")), "{:?}", about.findings);
 }
 
@@ -302,22 +306,20 @@ fn columns_that_contradict_each_other_in_part_are_noted() {
 #[test]
 fn the_preset_says_what_a_wrong_file_means() {
     let table = Plain::of(&generated(), 5);
-    let [mut wrong, mut corner, mut front] = [&table, &table, &table].map(Plain::clone);
+    let [mut wrong, mut front] = [(); 2].map(|()| table.clone());
     ["y", "vy", "heading"].iter().for_each(|column| wrong.map(column, |v, _| -v));
-    assert!(!understood(&wrong, &|_| ()).unwrap().is_usable());
-    let [length, width, heading] = ["length", "width", "heading"].map(|name| table.at(name));
+    assert!(!understood(&wrong).unwrap().is_usable());
+    let [length, heading] = ["length", "heading"].map(|name| table.at(name));
     let number = |row: &[String], at: usize| row[at].parse::<f64>().unwrap();
-    corner.map("x", |v, row| v - 0.5 * number(row, length));
-    corner.map("y", |v, row| v - 0.5 * number(row, width));
     front.map("x", |v, row| v + 0.5 * libm::cos(number(row, heading).to_radians()) * number(row, length));
     type Change = fn(&mut Preset);
     let says: [(Plain, Change); 3] = [
         (wrong, |preset| preset.axes.y = Side::Right),
-        (corner, |preset| preset.reference = Reference::Corner),
+        (of_corners(table), |preset| preset.reference = Reference::Corner),
         (front, |preset| preset.reference = Reference::Front),
     ];
     for (table, change) in says {
-        let about = understood(&table, &change).unwrap();
+        let about = read_by(&table, &change).unwrap().understanding;
         assert!(about.is_usable(), "{:?}", about.findings);
     }
 }
@@ -367,7 +369,7 @@ fn missing_values_gaps_and_repeated_rows_are_said() {
     // A hole of two seconds: two tracks.
     let hole: Vec<usize> = own[10..20].to_vec();
     table.rows = table.rows.into_iter().enumerate().filter(|(at, _)| !hole.contains(at)).map(|(_, row)| row).collect();
-    let LoadedTracks { loaded, understanding: about } = read(&table, &|_| ()).unwrap();
+    let LoadedTracks { loaded, understanding: about } = read(&table).unwrap();
     assert!(!loaded.vehicle_names.is_empty());
     for words in ["1 rows have no position", "2 rows repeat", "1 of these rows name another", "were interpolated"] {
         assert!(says(&about, words), "{words}: {:?}", about.findings);
@@ -375,11 +377,12 @@ fn missing_values_gaps_and_repeated_rows_are_said() {
     // What is no number is refused with its place.
     let mut bad = table.clone();
     bad.rows[3][t] = "soon".to_owned();
-    let error = understood(&bad, &|_| ()).unwrap_err().to_string();
+    let error = understood(&bad).unwrap_err().to_string();
     assert!(error.contains("line 5") && error.contains("`t`") && error.contains("soon"), "{error}");
 }
 
-/// The headers of the formats, as their publishers describe them.
+/// The headers of the formats, as their publishers describe them. SUMO writes no sizes, so a table with the usual names of
+/// sizes is that of another program.
 #[test]
 fn every_format_is_detected_by_its_header() {
     let headers = "\
@@ -390,6 +393,9 @@ tgsim|i294.csv|id,time,xloc-kf,yloc-kf,lane-kf,speed-kf,acceleration-kf,length-s
 ngsim|us101.csv|Vehicle_ID,Frame_ID,Total_Frames,Global_Time,Local_X,Local_Y,Global_X,Global_Y,v_length,v_Width,v_Class,v_Vel,v_Acc,Lane_ID,Preceding,Following,Space_Headway,Time_Headway,Location
 citysim|free.csv|frameNum,carId,carCenterX,carCenterY,headX,headY,tailX,tailY,carCenterXft,carCenterYft,speed,course,heading,laneId
 generic|x.csv|track_id,t,x,y,class
+sumo-fcd|table.csv|id,time,x,y,speed,lane,angle,type
+generic|table.csv|id,time,x,y,speed,lane,length,width,class
+generic|table.csv|id,time,x,y,speed,lane,angle,type,length,width
 ";
     let dir = tempfile::tempdir().unwrap();
     for line in headers.lines() {
@@ -472,23 +478,24 @@ fn in_format_of(preset: &Preset, recording: &Recording, stride: usize, mistake: 
     text
 }
 
+/// The columns of a table: whole numbers where they are named, numbers where the first row has one, else texts.
 #[cfg(feature = "parquet")]
-fn write_parquet(path: &Path, text: &str, vehicle: &str) {
+pub fn columns(text: &str, whole: &[&str]) -> Vec<(String, arrow_array::ArrayRef)> {
     use arrow_array::{ArrayRef, Float64Array, Int64Array, StringArray};
-    let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
-    let names = lines.next().unwrap();
-    let rows: Vec<Vec<&str>> = lines.collect();
-    let column = |at: usize, name: &str| -> ArrayRef {
-        let texts = || rows.iter().map(move |row| row[at]);
+    let table = Plain::of_text(text);
+    let column = |(at, name): (usize, &String)| -> (String, ArrayRef) {
+        let texts = || table.rows.iter().map(move |row| row[at].as_str());
         let numbers = || texts().map(|text| text.parse::<f64>().unwrap());
-        match rows[0][at].parse::<f64>() {
-            _ if name == vehicle => std::sync::Arc::new(Int64Array::from_iter_values(numbers().map(|id| id as i64))),
+        let array: ArrayRef = match table.rows[0][at].parse::<f64>() {
+            _ if whole.contains(&&**name) => {
+                std::sync::Arc::new(Int64Array::from_iter_values(numbers().map(|n| n as i64)))
+            }
             Err(_) => std::sync::Arc::new(StringArray::from_iter_values(texts())),
             Ok(_) => std::sync::Arc::new(Float64Array::from_iter_values(numbers())),
-        }
+        };
+        (name.clone(), array)
     };
-    let columns = names.iter().enumerate().map(|(at, name)| (*name, column(at, name))).collect();
-    crate::common::tables::made::write(path, columns, parquet::basic::Compression::SNAPPY);
+    table.header.iter().enumerate().map(column).collect()
 }
 
 /// Every preset reads traffic in its own format, and finds the usual mistakes in it.
@@ -521,7 +528,10 @@ fn every_preset_reads_its_own_format_and_finds_mistakes_in_it() {
             let text = in_format_of(&preset, &recording, stride, mistake);
             match is_parquet {
                 #[cfg(feature = "parquet")]
-                true => write_parquet(&path, &text, &preset.columns[&Role::Vehicle].names()[0]),
+                true => {
+                    let columns = columns(&text, &[preset.columns[&Role::Vehicle].names()[0].as_str()]);
+                    crate::common::made::write(&path, columns, parquet::basic::Compression::SNAPPY);
+                }
                 _ => std::fs::write(&path, text).unwrap(),
             }
             let file = TrackFile { path: path.clone(), id: "own".to_owned() };

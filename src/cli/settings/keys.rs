@@ -230,6 +230,6 @@ pub(crate) fn keys_in_order() -> Vec<Key> {
         Some(begin + at)
     };
     let mut keys = Key::all();
-    keys.sort_by_key(|key| place(key).unwrap_or(usize::MAX));
+    keys.sort_by_cached_key(|key| place(key).unwrap_or(usize::MAX));
     keys
 }

@@ -3,22 +3,21 @@
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use lanesweep::engine::{Backend, CpuBackend, Headway, LanePlan, SampleTally, Wanted};
+use lanesweep::Place;
+use lanesweep::engine::{Backend, LanePlan, SampleTally};
 use lanesweep::model::plausibility::Implausible;
-use lanesweep::model::profile::Profile;
+use lanesweep::prelude::*;
 use lanesweep::run::parts::{Counted, Journal, Ledger, read_part, read_sealed_line};
-use lanesweep::run::sampling::{Estimator, SampleCounts, SampleHeadways, SampleOptions, plan_samples, read_proposal};
-use lanesweep::run::study::{StudyHead, StudyOptions, plan_study};
+use lanesweep::run::sampling::{Estimator, SampleCounts, plan_samples, read_proposal};
+use lanesweep::run::study::{StudyHead, plan_study};
 use lanesweep::scenario::DataProvenance;
 use lanesweep::scenario::parameterization::ParameterizationOptions;
-use lanesweep::scenario::{Scenario, read_scenarios};
-use lanesweep::stats::density::{DensityModel, Exposure, read_density};
+use lanesweep::stats::density::Exposure;
 use lanesweep::stats::random::Stream;
-use lanesweep::traffic::mining::{MiningOptions, mine, mine_folder};
+use lanesweep::traffic::mining::mine;
 use lanesweep::traffic::trajectory::highd::HighdFiles;
 use lanesweep::traffic::trajectory::tracks::{Preset, TrackFile};
-use lanesweep::traffic::trajectory::{InputFile, Inputs, Loaded, NO_LANE, Recording};
-use lanesweep::{Error, Place, Result};
+use lanesweep::traffic::trajectory::{InputFile, Inputs, Loaded, NO_LANE};
 
 use super::seeds::Seeds;
 

@@ -4,22 +4,18 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
-use lanesweep::engine::{Backend, CpuBackend, SampleTally, Wanted};
-use lanesweep::model::profile::Profile;
+use lanesweep::engine::{Backend, SampleTally};
+use lanesweep::prelude::*;
 use lanesweep::run::parts::{Counted, Journal, MergeableCounts, Part, seal, write_part};
 use lanesweep::run::sampling::{SampleCounts, proposal_text};
-use lanesweep::run::study::{StudyOptions, outline_study};
+use lanesweep::run::study::outline_study;
 use lanesweep::scenario::parameterization::ParameterizationOptions;
-use lanesweep::scenario::{Category, Scenario, write_scenarios};
 use lanesweep::scenario::{DataProvenance, Driven};
-use lanesweep::stats::density::{DensityModel, write_density};
-use lanesweep::traffic::mining::{MiningOptions, mine_generated};
-use lanesweep::traffic::trajectory::Recording;
-use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
 use super::readers::{PART_UNITS, small_plan};
 use super::small;
 use crate::common::mined::{fitted, provenance};
+use crate::common::{CASES, text_of};
 
 /// Valid inputs and what the next steps need beside them.
 pub struct Seeds {
@@ -80,7 +76,6 @@ fn track_tables() -> Vec<Vec<u8>> {
 }
 
 fn presets() -> Vec<Vec<u8>> {
-    let generic = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/presets/generic.toml");
     let own = r#"name = "own"
 title = "own tracks"
 format = "csv"
@@ -117,7 +112,7 @@ columns = { vehicle = "id", length = "l" }
 file = "*_rec.csv"
 columns = { frame_rate = "fps" }
 "#;
-    vec![std::fs::read(generic).unwrap(), own.as_bytes().to_vec()]
+    vec![text_of("configs/presets/generic.toml").into_bytes(), own.as_bytes().to_vec()]
 }
 
 const INSTANTS: &str = "id,category,time_s,ego_speed_kmh,ego_length_m,ego_width_m,side,target_length_m,\
@@ -127,14 +122,6 @@ a,cut-in,10.04,107,4.5,1.8,left,4.2,1.9,72,3.4,,
 a,cut-in,10.08,106,4.5,1.8,left,4.2,1.9,90,3.3,,
 b,lvd,0,90,4.5,1.8,Right,4.2,1.9,90,0,1,
 b,,0.1,,,,,,,36,0.1,,
-";
-
-const CASES: &str =
-    "id,category,models,ego_speed_kmh,speed_mps,thw,gap,lateral_speed,acceleration,end_speed,ahead_gap,\
-ahead_speed_kmh,duration_s,rate_hz
-a,cut-in,FSM,108,20,1.2,,1.0,,,,,,
-,lvd,RSS,108,30,,30,,-6,0,,,,10
-c,cut-out,FSM,108,,1.2,,1.0,,,40,36,4,
 ";
 
 impl Seeds {

@@ -3,18 +3,18 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
-use super::{Bench, RUNS, SAMPLE, STUDY, same, shared};
+use super::{RUNS, SAMPLE, STUDY, bench, same, shared};
 use crate::common::program::{PROGRAM, ran, unbroken, words};
 use crate::common::skipped;
 
 /// Runs a shell script with an empty disk of its own at `$DISK`; `None` where this machine allows no mounts.
-fn on_a_disk(bench: &Bench, size: &str, script: &str, line: &str) -> Option<Output> {
-    let disk = bench.path().join("disk");
+fn on_a_disk(bench: &Path, size: &str, script: &str, line: &str) -> Option<Output> {
+    let disk = bench.join("disk");
     std::fs::create_dir_all(&disk).unwrap();
     let mount = format!("mount -t tmpfs -o size={size} none \"$DISK\" || exit 99\n");
     let run = |namespace: &str, script: &str| {
         let mut command = Command::new("unshare");
-        command.args([namespace, "sh", "-c", script, PROGRAM]).args(words(line)).current_dir(bench.path());
+        command.args([namespace, "sh", "-c", script, PROGRAM]).args(words(line)).current_dir(bench);
         command.env("DISK", &disk).env("NO_COLOR", "1").output().ok()
     };
     // As root, or as whoever may be root of a namespace of their own.
@@ -33,7 +33,7 @@ fn lines(output: &Output) -> Vec<String> {
 
 #[test]
 fn a_disk_that_fills_up_is_told_and_the_same_command_ends_well_once_there_is_space() {
-    let bench = Bench::new();
+    let bench = bench();
     // The lock takes a page of 4 KiB: room for nothing else, for a bit of journal, for some results.
     let script = "\
         \"$0\" \"$@\" --out \"$DISK/out\" >/dev/null; echo full $?\n\
@@ -50,8 +50,8 @@ fn a_disk_that_fills_up_is_told_and_the_same_command_ends_well_once_there_is_spa
             assert_eq!(lines(&output), ["full 6", "0", "freed 0"], "{name}, {size}: {said}");
             assert!(said.contains("No space left") && said.contains("the disk is full"), "{name}, {size}: {said}");
             of_journals += u32::from(said.contains(".journal") && said.contains("goes on from them"));
-            same(&bench.path().join("copy"), &whole);
-            std::fs::remove_dir_all(bench.path().join("copy")).unwrap();
+            same(&bench.join("copy"), &whole);
+            std::fs::remove_dir_all(bench.join("copy")).unwrap();
         }
     }
     assert!(of_journals > 0, "no journal met the full disk");
@@ -59,7 +59,7 @@ fn a_disk_that_fills_up_is_told_and_the_same_command_ends_well_once_there_is_spa
 
 #[test]
 fn a_disk_that_becomes_read_only_keeps_what_is_done() {
-    let bench = Bench::new();
+    let bench = bench();
     let script = "\
         \"$0\" \"$@\" --out \"$DISK/out\" --config run.stop_after_s=0.3 >/dev/null; echo stopped $?\n\
         mount -o remount,ro \"$DISK\"\n\
@@ -72,26 +72,26 @@ fn a_disk_that_becomes_read_only_keeps_what_is_done() {
     let said = unbroken(&output.stderr);
     assert_eq!(lines(&output), ["stopped 75", "kept 6", "new 6", "writable 0"], "{said}");
     assert_eq!(said.matches("mounted read-only").count(), 2, "{said}");
-    same(&bench.path().join("copy"), &shared().join("sample"));
+    same(&bench.join("copy"), &shared().join("sample"));
 }
 
 #[test]
 fn a_folder_without_permission_is_told_and_left_as_it_is() {
     use std::os::unix::fs::{MetadataExt, PermissionsExt};
-    let bench = Bench::new();
-    let out = bench.path().join("out");
+    let bench = bench();
+    let out = bench.join("out");
     std::fs::create_dir(&out).unwrap();
     let mode = |path: &Path, mode| std::fs::set_permissions(path, std::fs::Permissions::from_mode(mode)).unwrap();
-    mode(bench.path(), 0o755);
+    mode(&bench, 0o755);
     mode(&out, 0o555);
-    let is_root = std::fs::metadata(bench.path()).unwrap().uid() == 0;
+    let is_root = std::fs::metadata(&*bench).unwrap().uid() == 0;
     let line = format!("{STUDY} --out out");
     let mut command = Command::new(if is_root { "setpriv" } else { PROGRAM });
     if is_root {
         // Permissions do not bind root.
         command.args(["--reuid=65534", "--regid=65534", "--clear-groups", PROGRAM]);
     }
-    let Ok(output) = command.args(words(&line)).current_dir(bench.path()).env("NO_COLOR", "1").output() else {
+    let Ok(output) = command.args(words(&line)).current_dir(&*bench).env("NO_COLOR", "1").output() else {
         return skipped("needs setpriv to be somebody else than root");
     };
     let said = unbroken(&output.stderr);
@@ -102,6 +102,6 @@ fn a_folder_without_permission_is_told_and_left_as_it_is() {
     assert!(said.contains("you have no permission") && said.contains("out"), "{said}");
     assert_eq!(std::fs::read_dir(&out).unwrap().count(), 0);
     mode(&out, 0o755);
-    ran(bench.path(), &line);
+    ran(&bench, &line);
     same(&out, &shared().join("study"));
 }

@@ -5,11 +5,10 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::time::Duration;
 
-use lanesweep::engine::verify::{SetOptions, random_plan};
-use lanesweep::engine::{Backend, Chunk, CpuBackend, Executor, LanePlan, Partial, Session, Wanted};
-use lanesweep::model::profile::Profile;
+use crate::common::lane_sets::random;
+use lanesweep::engine::{Backend, Chunk, LanePlan, Partial, Session};
+use lanesweep::prelude::*;
 use lanesweep::run::parts::{Journal, Ledger};
-use lanesweep::{Error, Result};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Failure {
@@ -80,8 +79,7 @@ fn journalled(plan: &LanePlan, backend: &dyn Backend, path: &Path) -> Result<(u6
 
 #[test]
 fn after_a_panic_in_a_worker_or_a_lost_device_the_journal_is_whole_and_another_backend_ends_the_run() {
-    let options = SetOptions { size: 800, ..Default::default() };
-    let plan = random_plan(&Profile::load("paper").unwrap(), &options).unwrap();
+    let plan = random(&Profile::load("paper").unwrap(), 800);
     let dir = tempfile::tempdir().unwrap();
     let cpu = CpuBackend::lane_arithmetic();
     let (_, undisturbed) = journalled(&plan, &cpu, &dir.path().join("undisturbed")).unwrap();

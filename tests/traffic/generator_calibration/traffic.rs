@@ -1,5 +1,6 @@
 //! Figures of the traffic in recordings, by definitions of their own: the miner is not used here.
 
+use crate::common::quintic;
 use lanesweep::traffic::trajectory::{Recording, Track, VehicleClass};
 
 /// Lateral speed above which a vehicle is seen to change lane, m/s.
@@ -34,7 +35,7 @@ pub fn class_index(class: VehicleClass) -> usize {
 }
 
 /// Counts over all recordings, each `duration_s` long with `window_m` of road.
-pub fn measure(recordings: &[Recording], duration_s: f64, window_m: f64) -> Traffic {
+pub fn measure(recordings: &[&Recording], duration_s: f64, window_m: f64) -> Traffic {
     let mut traffic = Traffic::default();
     let (mut directions, mut lanes, mut samples) = (0, 0, 0.0);
     for recording in recordings {
@@ -118,8 +119,7 @@ fn lane_change(track: &Track, k: usize, rate: f64, traffic: &mut Traffic) {
     let half = 0.5 * (track.d_m[end] + track.d_m[start]);
     let middle = (start..end).find(|&j| (track.d_m[j] - half) * (track.d_m[j + 1] - half) <= 0.0).unwrap_or(k);
     let squares = (start..=end).map(|j| {
-        let phase = ((j as f64 - middle as f64) / (rate * duration_s) + 0.5).clamp(0.0, 1.0);
-        let share = phase * phase * phase * (10.0 - 15.0 * phase + 6.0 * phase * phase);
+        let share = quintic((j as f64 - middle as f64) / (rate * duration_s) + 0.5);
         let off = (track.d_m[j] - half) / way + 0.5 - share;
         off * off
     });

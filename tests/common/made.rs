@@ -72,7 +72,7 @@ pub fn series(rows: &[Vec<f64>]) -> ArrayRef {
 }
 
 /// Writes a file as other programs do.
-pub fn write(path: &Path, columns: Vec<(&str, ArrayRef)>, compression: Compression) {
+pub fn write<N: AsRef<str>>(path: &Path, columns: Vec<(N, ArrayRef)>, compression: Compression) {
     let batch = RecordBatch::try_from_iter(columns).unwrap();
     let properties = WriterProperties::builder().set_compression(compression).build();
     let mut writer = ArrowWriter::try_new(File::create(path).unwrap(), batch.schema(), Some(properties)).unwrap();

@@ -1,3 +1,0 @@
-//! Tables as other programs write them.
-
-pub mod made;
