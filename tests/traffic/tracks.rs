@@ -9,7 +9,7 @@ use lanesweep::traffic::mining::{MiningOptions, mine};
 use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
 use lanesweep::traffic::trajectory::highd;
 use lanesweep::traffic::trajectory::tracks::{
-    self, HeadingOrigin, LoadedTracks, Preset, Reference, RoadSource, Role, Side, TrackFile, Understanding,
+    self, HeadingOrigin, Preset, Reference, RoadSource, Role, Side, TrackFile, Understanding,
 };
 use lanesweep::traffic::trajectory::{Carriageway, Inputs, Loaded, NO_LANE, Recording, Track, VehicleClass};
 
@@ -150,7 +150,7 @@ pub fn says(about: &Understanding, words: &str) -> bool {
 }
 
 /// A table under the generic preset, changed.
-pub fn read(table: &Plain, change: &dyn Fn(&mut Preset)) -> lanesweep::Result<LoadedTracks> {
+pub fn read(table: &Plain, change: &dyn Fn(&mut Preset)) -> lanesweep::Result<Loaded> {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("own.csv");
     std::fs::write(&path, table.text()).unwrap();
@@ -367,10 +367,11 @@ fn missing_values_gaps_and_repeated_rows_are_said() {
     // A hole of two seconds: two tracks.
     let hole: Vec<usize> = own[10..20].to_vec();
     table.rows = table.rows.into_iter().enumerate().filter(|(at, _)| !hole.contains(at)).map(|(_, row)| row).collect();
-    let LoadedTracks { loaded, understanding: about } = read(&table, &|_| ()).unwrap();
+    let loaded = read(&table, &|_| ()).unwrap();
+    let about = &loaded.understanding;
     assert!(!loaded.vehicle_names.is_empty());
     for words in ["1 rows have no position", "2 rows repeat", "1 of these rows name another", "were interpolated"] {
-        assert!(says(&about, words), "{words}: {:?}", about.findings);
+        assert!(says(about, words), "{words}: {:?}", about.findings);
     }
     // What is no number is refused with its place.
     let mut bad = table.clone();

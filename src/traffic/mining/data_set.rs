@@ -70,12 +70,10 @@ impl<'a> DataSet<'a> {
     /// All vehicles that lead at some sample, in the order of their first leading sample.
     pub(super) fn leaders(&self) -> Vec<usize> {
         let mut leaders: Vec<usize> = Vec::new();
-        let mut last = None;
         for leader in self.leader.iter().flatten().map(|&l| l as usize) {
-            if last != Some(leader) && !leaders.contains(&leader) {
+            if !leaders.contains(&leader) {
                 leaders.push(leader);
             }
-            last = Some(leader);
         }
         leaders
     }
@@ -126,19 +124,13 @@ impl<'a> DataSet<'a> {
         let first = (-offset).max(0);
         let end = (target.len() as i64 - offset).min(self.samples as i64);
         let mut stretches: Vec<Stretch> = Vec::new();
-        let mut open = false;
-        for k in first..end {
-            let (k, j) = (k as usize, (k + offset) as usize);
-            if !self.in_range(k, target, j) {
-                open = false;
-                continue;
-            }
-            if !open {
-                stretches.push(Stretch { first: k, tags: Vec::new() });
-                open = true;
-            }
-            if let Some(stretch) = stretches.last_mut() {
-                stretch.tags.push(self.tags(k, target_index, j));
+        for (k, j) in (first..end).map(|k| (k as usize, (k + offset) as usize)) {
+            if self.in_range(k, target, j) {
+                let tags = self.tags(k, target_index, j);
+                match stretches.last_mut() {
+                    Some(open) if open.first + open.tags.len() == k => open.tags.push(tags),
+                    _ => stretches.push(Stretch { first: k, tags: vec![tags] }),
+                }
             }
         }
         stretches

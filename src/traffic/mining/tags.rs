@@ -59,14 +59,9 @@ impl Activities {
         let (low, high) = track.d_m.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &d| (l.min(d), h.max(d)));
         let reaches_a_line =
             carriageway.lane_lines_m.iter().any(|&line| line >= low - TOLERANCE && line <= high + TOLERANCE);
-        let lane_changes = if reaches_a_line {
-            (0..carriageway.lane_count())
-                .filter_map(|lane| carriageway.lane(lane))
-                .map(|lane| lane_changes(&track.d_m, lane, frame_rate_hz, &options.lateral))
-                .collect()
-        } else {
-            Vec::new()
-        };
+        let lanes = if reaches_a_line { carriageway.lane_count() } else { 0 };
+        let changes = |lane| lane_changes(&track.d_m, lane, frame_rate_hz, &options.lateral);
+        let lane_changes = (0..lanes).filter_map(|lane| carriageway.lane(lane)).map(changes).collect();
         let longitudinal = longitudinal_events(&track.v_s_mps, frame_rate_hz, &options.longitudinal);
         Activities { longitudinal, lane_changes }
     }

@@ -9,6 +9,7 @@
 use std::collections::BTreeMap;
 
 use super::csv_table::FileChecksum;
+use super::tracks::Understanding;
 use lanesweep_support::settings;
 
 /// One recording: a stretch of road over a period of time.
@@ -39,6 +40,8 @@ pub struct Loaded {
     pub vehicle_names: BTreeMap<u32, String>,
     /// The frame of the file at frame 0 of the recording, and frames of the file per frame; `None` if they are the same.
     pub file_frames: Option<[i64; 2]>,
+    /// What was understood of them; empty before the checks.
+    pub understanding: Understanding,
 }
 
 /// One direction of travel with its lanes.
@@ -55,6 +58,11 @@ impl Carriageway {
     /// Number of lanes.
     pub fn lane_count(&self) -> usize {
         self.lane_lines_m.len().saturating_sub(1)
+    }
+
+    /// Widths of the lanes from left to right, m.
+    pub(crate) fn widths_m(&self) -> impl Iterator<Item = f64> {
+        self.lane_lines_m.windows(2).map(|lines| lines[0] - lines[1])
     }
 
     /// Left and right line of a lane; `None` beyond the carriageway.

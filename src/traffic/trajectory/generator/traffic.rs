@@ -133,7 +133,7 @@ impl<'a> Traffic<'a> {
             let sample = since.filter(|s| s.is_multiple_of(steps_per_sample));
             self.advance(sample.map(|s| s / steps_per_sample));
         }
-        self.vehicles.retain(|vehicle| !vehicle.samples.s_m.is_empty());
+        self.vehicles.retain(|vehicle| !vehicle.samples.is_empty());
         self.vehicles
     }
 
@@ -268,8 +268,8 @@ impl<'a> Traffic<'a> {
                 && (0.0..=self.options.window_m).contains(&own.s_m)
             {
                 let samples = &mut own.samples;
-                if samples.s_m.is_empty() {
-                    samples.first = sample;
+                if samples.is_empty() {
+                    samples.first_frame = sample as i64;
                 }
                 samples.s_m.push(own.s_m);
                 samples.d_m.push(d_m);

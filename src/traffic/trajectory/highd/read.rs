@@ -1,7 +1,5 @@
 //! Reads one recording's three files into the internal model, in one pass, from the needed columns only.
 
-use std::collections::BTreeMap;
-
 use super::format::{FRAME_LIMIT, TRACKS_HEADER};
 use super::inventory::{HighdFiles, made_up};
 use super::meta::{self, RecordingMeta, VehicleMeta};
@@ -50,7 +48,8 @@ pub fn read_checked(files: &HighdFiles, implausible: Implausible) -> Result<Load
         tracks: vehicles.into_iter().map(|vehicle| vehicle.track).filter(|track| !track.is_empty()).collect(),
         synthetic: meta.synthetic || made_up(folder_of(&files.recording_meta)).is_some(),
     };
-    Ok(Loaded { recording, checksum_sha256, notes, vehicle_names: BTreeMap::new(), file_frames: None })
+    let (vehicle_names, understanding) = Default::default();
+    Ok(Loaded { recording, checksum_sha256, notes, vehicle_names, file_frames: None, understanding })
 }
 
 struct TrackColumns {

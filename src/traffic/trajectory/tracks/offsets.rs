@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use super::findings::MIN_VEHICLES;
 use super::lanes::BY_WIDTH;
 use super::road::median;
-use super::understanding::Understanding;
+use super::understanding::{Understanding, lengths_m};
 use crate::trajectory::motion::{JUMP_ACROSS_M, JUMP_ALONG_M, jumps};
 use crate::trajectory::overlap::overlaps;
 use crate::trajectory::{Carriageway, Recording, Track, VehicleClass};
@@ -24,8 +24,7 @@ const BESIDE_M: f64 = 0.5;
 impl Understanding {
     /// Finds lengths that end at one value.
     pub(super) fn check_sizes(&mut self, recording: &Recording) {
-        let mut lengths: Vec<f64> =
-            recording.tracks.iter().filter(|of| of.class == VehicleClass::Truck).map(|of| of.length_m).collect();
+        let mut lengths = lengths_m(recording, VehicleClass::Truck);
         lengths.sort_by(f64::total_cmp);
         let longest_m = lengths.last().copied().unwrap_or(0.0);
         let others = lengths.iter().filter(|length_m| **length_m < longest_m).count();

@@ -45,18 +45,14 @@ impl Columns {
             let position = column.names().iter().find_map(|name| positions.get(&letters(name)));
             at[*role as usize] = position.copied().zip(column.factor(*role));
         }
-        let has_time_unit = named
+        let mut has_time_unit = named
             .get(&Role::Time)
             .is_some_and(|time| time.unit().is_some_and(|unit| unit != "date") || time.factor(Role::Time) != Some(1.0));
         // INTERACTION's time has its unit in its name.
         let in_ms = header.iter().position(|column| letters(column) == "timestampms");
-        let has_time_unit = match in_ms {
-            Some(position) if at[Role::Time as usize].is_none() && named.contains_key(&Role::Time) => {
-                at[Role::Time as usize] = Some((position, 1e-3));
-                true
-            }
-            _ => has_time_unit,
-        };
+        if at[Role::Time as usize].is_none() && in_ms.is_some() && named.contains_key(&Role::Time) {
+            (at[Role::Time as usize], has_time_unit) = (in_ms.map(|position| (position, 1e-3)), true);
+        }
         let none_numbers = none.iter().filter_map(|text| text.parse().ok()).collect();
         let (names, none) = (header.to_vec(), none.to_vec());
         Columns { at, names, has_time_unit, found_time: Cell::new(None), none, none_numbers }
@@ -129,7 +125,8 @@ fn each_letter(text: &str) -> impl Iterator<Item = char> {
 /// A file of rows.
 pub(super) struct Rows {
     path: PathBuf,
-    header: Vec<String>,
+    /// Column names.
+    pub header: Vec<String>,
     source: RowSource,
 }
 
@@ -151,7 +148,7 @@ impl Rows {
             }
             false => {
                 let table = CsvTable::open(path, "")?;
-                (table.header().to_vec(), RowSource::Text(Box::new(table)))
+                (table.header.clone(), RowSource::Text(Box::new(table)))
             }
         };
         let rows = Rows { path: path.to_path_buf(), header, source };
@@ -162,11 +159,6 @@ impl Rows {
             return Err(Error::input(rows.header_place(), problem, "rename one of them, or remove it"));
         }
         Ok(rows)
-    }
-
-    /// Column names.
-    pub(super) fn header(&self) -> &[String] {
-        &self.header
     }
 
     /// The place of the header.
@@ -250,7 +242,7 @@ impl SampleRow<'_> {
         let si = |value: f64, text: &dyn Fn() -> String| self.columns.si(value, role, text, || self.place(role));
         // Most values, without a text.
         if let (Line::Text(table), Some((at, _))) = (&self.source, self.columns.at[role as usize])
-            && !table.has_decimal_commas()
+            && !table.has_decimal_commas
             && let Some(value) = number::short_decimal(table.bytes(at))
         {
             return si(value, &|| String::from_utf8_lossy(table.bytes(at)).into_owned());
@@ -268,7 +260,7 @@ impl SampleRow<'_> {
     fn number_of(&self, text: &str, role: Role) -> Result<Option<f64>> {
         let (columns, mut text) = (self.columns, Cow::Borrowed(text));
         if let Line::Text(table) = self.source
-            && table.has_decimal_commas()
+            && table.has_decimal_commas
             && !text.contains(':')
         {
             // A point separates thousands, or another program wrote this number.
