@@ -99,6 +99,7 @@ impl Sample {
     pub(super) fn check(&self) -> Result<()> {
         let settings = &self.settings;
         let is_crude = self.is_crude();
+        let refused = |flag, problem: &str, help: &str| Err(Error::usage(Place::option(flag), problem, help));
         if self.rows.is_some() && !is_crude {
             return Err(only_crude("rows"));
         }
@@ -107,19 +108,14 @@ impl Sample {
         }
         if self.shards.is_split() && is_crude && (settings.half_width.is_some() || settings.time_limit_s.is_some()) {
             let problem = "a part of a run cannot evaluate a stop rule of the whole run";
-            return Err(Error::usage(
-                Place::option("shard"),
-                problem,
-                format!("leave out the stop rules, or {}", option("shard")),
-            ));
+            return refused("shard", problem, &format!("leave out the stop rules, or {}", option("shard")));
         }
         if self.proposal.is_some() && settings.assurance == Assurance::Search {
-            let problem = "a given proposal is not searched";
-            return Err(Error::usage(Place::option("assurance"), problem, "leave out one of the two"));
+            return refused("assurance", "a given proposal is not searched", "leave out one of the two");
         }
         if self.proposal.is_some() && settings.estimator != EstimatorKind::Is {
             let problem = "a given proposal is sampled by importance sampling";
-            return Err(Error::usage(Place::option("proposal"), problem, format!("add {}", option("estimator = is"))));
+            return refused("proposal", problem, &format!("add {}", option("estimator = is")));
         }
         Ok(())
     }

@@ -70,8 +70,8 @@ impl XoscFlags {
     /// Writes the files, if they are asked for.
     pub(super) fn write(&self, played: &[Concrete]) -> Result<()> {
         let Some(dir) = &self.xosc else { return Ok(()) };
-        let rows = export_folder(dir, played)?;
-        tracing::info!("{} written to {}; index.csv lists them", counted(rows.len(), "scenario"), dir.display());
+        export_folder(dir, played)?;
+        tracing::info!("{} written to {}; index.csv lists them", counted(played.len(), "scenario"), dir.display());
         Ok(())
     }
 }

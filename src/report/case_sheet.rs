@@ -19,7 +19,7 @@ use lanesweep_run::check::{Boundary, Change, Judged, Judgement, Reading, RunEnd,
 use lanesweep_run::grid::VARIED;
 use lanesweep_support::readable::value;
 use lanesweep_support::run_folder::NamedTable;
-use lanesweep_support::table::{Column, NumberText, Table, json_number};
+use lanesweep_support::table::{Cell, Column, NumberText, Table, json_number};
 use lanesweep_support::{Result, option};
 
 /// What the columns of the drivers show.
@@ -119,13 +119,13 @@ impl CaseSheet<'_> {
 
     /// The drivers under the first profile, and those under the others that differ.
     fn drivers_by_profile(&self) -> [Table; 2] {
-        let (mut first, mut others) = (self.drivers(), self.drivers());
-        let profile = &self.first().profile;
-        let is_first: Vec<bool> = first.shown().1.iter().map(|row| row[0] == *profile).collect();
-        let (mut at, mut other_at) = (is_first.iter(), is_first.iter());
-        first.rows.retain(|_| at.next() == Some(&true));
-        others.rows.retain(|_| other_at.next() == Some(&false));
-        [first.captioned(format!("Drivers under {profile}")), others.captioned("Drivers under other profiles")]
+        let (Table { columns, rows, .. }, profile) = (self.drivers(), self.first().profile.as_str());
+        let (of_first, of_others) = rows.into_iter().partition(|row| row[0] == Cell::text(profile));
+        let table = |caption: String, rows| Table { caption, columns: columns.clone(), rows };
+        [
+            table(format!("Drivers under {profile}"), of_first),
+            table("Drivers under other profiles".to_owned(), of_others),
+        ]
     }
 
     fn clauses(&self) -> Table {
@@ -168,23 +168,22 @@ impl CaseSheet<'_> {
             .build()
     }
 
-    /// Where the case comes from, on a line before it; nothing for a case of flags.
-    fn source(&self) -> String {
-        if self.identity.file_sha256.is_some() { format!("{}:\n", self.origin) } else { String::new() }
+    /// Where the case comes from, if from a file, the case, and the answer.
+    fn head(&self) -> String {
+        let synthetic = if self.is_synthetic { "SYNTHETIC DATA: " } else { "" };
+        let origin = self.identity.file_sha256.as_ref().map_or(String::new(), |_| format!("{}:\n", self.origin));
+        format!("{synthetic}{origin}{}\n{}\n", self.case(), self.answer())
     }
 
     /// The answer on one screen.
     pub fn brief(&self) -> String {
-        let synthetic = if self.is_synthetic { "SYNTHETIC DATA: " } else { "" };
         let sentences = self.demand().into_iter().chain(self.silent()).chain(self.cautions());
         let sentences = sentences.map(|sentence| format!("  {}\n", wrap(&sentence, WIDTH - 2).replace('\n', "\n  ")));
         let [drivers, _] = self.drivers_by_profile();
         format!(
-            "{synthetic}{}{}\n{}\n{}{}Where another answer begins, all else equal; the last columns: another collision\n{}\
+            "{}{}{}Where another answer begins, all else equal; the last columns: another collision\n{}\
              Other profiles, clauses, readings and hashes: {}, or a page to print: {}\n",
-            self.source(),
-            self.case(),
-            self.answer(),
+            self.head(),
             sentences.collect::<String>(),
             drivers.text(),
             self.boundaries().text(),
@@ -195,23 +194,17 @@ impl CaseSheet<'_> {
 
     /// The sheet as text.
     pub fn text(&self) -> String {
-        let synthetic = if self.is_synthetic { "SYNTHETIC DATA: " } else { "" };
-        let numbers: Vec<String> =
-            self.numbers().iter().map(|(name, number)| format!("  {name}: {number}\n")).collect();
+        let numbers: String = self.numbers().iter().map(|(name, number)| format!("  {name}: {number}\n")).collect();
         let cautions = self
             .rule()
             .into_iter()
             .chain(self.cautions())
             .map(|caution| wrap(&caution, WIDTH - 2).replace('\n', "\n  "));
         let sentences = self.demand().into_iter().chain(self.silent()).chain(cautions);
-        let demand: Vec<String> = sentences.map(|sentence| format!("  {sentence}\n")).collect();
+        let sentences: String = sentences.map(|sentence| format!("  {sentence}\n")).collect();
         format!(
-            "{synthetic}{}{}\n{}\n{}{}\n{}\n{}\nClauses under {}\n{}\n{}\n{}\n{}",
-            self.source(),
-            self.case(),
-            self.answer(),
-            demand.concat(),
-            numbers.concat(),
+            "{}{sentences}{numbers}\n{}\n{}\nClauses under {}\n{}\n{}\n{}\n{}",
+            self.head(),
             wrap(&format!("Drivers. {DRIVERS}"), WIDTH),
             self.drivers().text(),
             self.first().profile,

@@ -11,7 +11,7 @@ use lanesweep_model::profile::Profile;
 use lanesweep_support::readable::{count, counted};
 
 /// Facts about the machine.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct Host {
     /// Commit of the program; empty if unknown. Records have it beside the program's version.
     #[serde(skip)]
@@ -53,15 +53,8 @@ impl Host {
 
     /// For the merged parts of a run, which had their own machines and commands.
     pub fn of_parts(commit: &'static str, parts: usize, rechecked_lanes: u64) -> Host {
-        Host {
-            commit,
-            backend: format!("{} merged", counted(parts, "part")),
-            device: None,
-            rechecked_lanes,
-            seconds: 0.0,
-            threads: rayon::current_num_threads(),
-            settings: Vec::new(),
-        }
+        let (backend, threads) = (format!("{} merged", counted(parts, "part")), rayon::current_num_threads());
+        Host { commit, backend, rechecked_lanes, threads, ..Host::default() }
     }
 
     /// The chapter on what repeats a run.

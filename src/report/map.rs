@@ -121,27 +121,24 @@ impl MapReport {
         let (plan, grid) = (&mapped.plan, &mapped.plan.grid);
         let cells: Vec<CellOutcome> =
             (0..mapped.map.cell_count()).map(|cell| mapped.map.outcome(model, cell, self.criterion)).collect();
-        let mut notes = Vec::new();
-        if self.criterion == Criterion::Collision {
-            notes.push(
-                "Pass: the driver avoids the collision by braking. No conflict: no collision even if the ego never reacts."
-                    .to_owned(),
-            );
-        }
-        if cells.contains(&CellOutcome::FailByReaction) {
-            notes.push(
-                "Fail by reaction: the driver reacts and collides; without a reaction nothing collides.".to_owned(),
-            );
-        }
-        if self.is_robust() && not_preventable.as_ref().is_some_and(|cells| cells.contains(&true)) {
-            notes.push("Red dashes count every cell as computed, an undecided one too.".to_owned());
-        }
-        if grid.native_gap {
-            notes.push("Initial gap: each model's own distance at the ego's speed, a headway of 2 s where it has none (column initial_gap_m).".to_owned());
-        }
-        if grid.style == CaseStyle::JrcComparison {
-            notes.push("Cases with the lateral run-up of the JRC's comparison sweep.".to_owned());
-        }
+        let has_dashes = not_preventable.as_ref().is_some_and(|cells| cells.contains(&true));
+        let notes = [
+            (
+                self.criterion == Criterion::Collision,
+                "Pass: the driver avoids the collision by braking. No conflict: no collision even if the ego never reacts.",
+            ),
+            (
+                cells.contains(&CellOutcome::FailByReaction),
+                "Fail by reaction: the driver reacts and collides; without a reaction nothing collides.",
+            ),
+            (self.is_robust() && has_dashes, "Red dashes count every cell as computed, an undecided one too."),
+            (
+                grid.native_gap,
+                "Initial gap: each model's own distance at the ego's speed, a headway of 2 s where it has none (column initial_gap_m).",
+            ),
+            (grid.style == CaseStyle::JrcComparison, "Cases with the lateral run-up of the JRC's comparison sweep."),
+        ];
+        let notes = notes.into_iter().filter(|(is_said, _)| *is_said).map(|(_, note)| note.to_owned()).collect();
         let profile = plan.parts.first().map_or(&self.profile, |part| &part.plan.profile);
         let held = grid.held(profile).join("; ");
         let model = mapped.map.models[model].name();

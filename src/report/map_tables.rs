@@ -56,19 +56,10 @@ impl MapReport {
 
     /// What the columns count, and cautions.
     pub(super) fn words(&self) -> String {
-        let mut text = String::new();
-        if self.grids.iter().any(|mapped| mapped.is_chosen_to_match) {
-            text.push_str(
-                "* The known grid is not published. Ours was chosen so that the share of RSS comes out: that it agrees \
-                 confirms nothing.\n",
-            );
-        }
-        text.push_str(&self.words_of_outcomes(&self.shown_outcomes()));
-        text
-    }
-
-    /// What the columns count.
-    fn words_of_outcomes(&self, outcomes: &[CellOutcome]) -> String {
+        let of_grid = self.grids.iter().any(|mapped| mapped.is_chosen_to_match).then_some(
+            "* The known grid is not published. Ours was chosen so that the share of RSS comes out: that it agrees \
+             confirms nothing.\n",
+        );
         let undecided = format!(
             "Undecided: {}an ego that never reacts is still closing in at the time cap of {} s; the share counts these cells as \
              computed.\n",
@@ -99,8 +90,9 @@ impl MapReport {
             }
             Criterion::Ttc | Criterion::Btn => "",
         };
-        let cautions = self.cautions();
-        outcomes.iter().map(sentence).chain([of_all]).chain(cautions.iter().map(String::as_str)).collect()
+        let (outcomes, cautions) = (self.shown_outcomes(), self.cautions());
+        let of_outcomes = outcomes.iter().map(sentence).chain([of_all]);
+        of_grid.into_iter().chain(of_outcomes).chain(cautions.iter().map(String::as_str)).collect()
     }
 
     /// Sentences on cells whose case is not what a reader would take it for.

@@ -279,17 +279,16 @@ pub(super) fn paragraph(words: &str) -> String {
 
 /// The text wrapped between words; a longer word stays whole.
 pub(crate) fn wrap(text: &str, width: usize) -> String {
-    let mut lines = vec![String::new()];
+    let (mut wrapped, mut column) = (String::new(), 0);
     for word in text.split(' ') {
-        let last = lines.len() - 1;
-        if !lines[last].is_empty() && lines[last].chars().count() + 1 + word.chars().count() > width {
-            lines.push(word.to_owned());
-        } else {
-            if !lines[last].is_empty() {
-                lines[last].push(' ');
-            }
-            lines[last].push_str(word);
-        }
+        let length = word.chars().count();
+        let (space, begin) = match column {
+            0 => ("", 0),
+            _ if column + 1 + length > width => ("\n", 0),
+            _ => (" ", column + 1),
+        };
+        wrapped.extend([space, word]);
+        column = begin + length;
     }
-    lines.join("\n")
+    wrapped
 }

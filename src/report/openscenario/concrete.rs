@@ -58,8 +58,8 @@ pub struct Concrete {
     pub vehicles: Vec<PlayedVehicle>,
     /// The concrete parameters: names with units, values.
     pub parameters: Vec<(String, f64)>,
-    /// Properties of the lane and its outcome, in order.
-    pub properties: Vec<(String, String)>,
+    /// Properties of the lane and its outcome, in order, its key first.
+    pub properties: Vec<(&'static str, String)>,
     /// Whether the data are synthetic.
     pub is_synthetic: bool,
 }

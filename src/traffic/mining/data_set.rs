@@ -3,6 +3,7 @@
 //!
 //! [`FoundScenario`] is what all categories take from the tracks of a match.
 
+use super::longitudinal::Longitudinal;
 use super::options::{MiningOptions, TOLERANCE};
 use super::tags::{Activities, Tags};
 use crate::trajectory::{Carriageway, FrameIndex, Lane, NO_LANE, Recording, Track};
@@ -141,13 +142,13 @@ impl<'a> DataSet<'a> {
         let (ego, target) =
             (&self.recording_tags.activities[self.ego_index], &self.recording_tags.activities[target_index]);
         let change = target.lane_change(lane, j).map(|c| c.kind.is_in());
-        let decelerates = target.longitudinal_at(j) == Some(super::longitudinal::Longitudinal::Decelerating);
-        Tags::default()
-            .with(Tags::LEADER, self.leader[k] == Some(target_index as u32))
-            .with(Tags::CHANGES_IN, change == Some(true))
-            .with(Tags::CHANGES_OUT, change == Some(false))
-            .with(Tags::DECELERATES, decelerates)
-            .with(Tags::EGO_KEEPS_LANE, lane != NO_LANE && ego.lane_change(lane, k).is_none())
+        Tags {
+            leader: self.leader[k] == Some(target_index as u32),
+            changes_in: change == Some(true),
+            changes_out: change == Some(false),
+            decelerates: target.longitudinal_at(j) == Some(Longitudinal::Decelerating),
+            ego_keeps_lane: lane != NO_LANE && ego.lane_change(lane, k).is_none(),
+        }
     }
 }
 

@@ -174,36 +174,37 @@ impl Rows {
     /// # Errors
     /// Those of the file and of `each`.
     pub(super) fn each(
-        self,
+        mut self,
         columns: &Columns,
         mut each: impl FnMut(&SampleRow) -> Result<()>,
     ) -> Result<FileChecksum> {
+        let mut order = [0; Role::ALL.len()];
+        if let RowSource::Parquet(reader) = &mut self.source {
+            let wanted: Vec<usize> = columns.at.iter().flatten().map(|(at, _)| *at).collect();
+            reader.rows.want(&wanted)?;
+            if reader.rows.has_lists() {
+                let problem = "the cells of a column are lists; a row is one vehicle at one time";
+                let help = "make such a table in Python: `lanesweep.tracks.lists`, or `swiftraj`";
+                return Err(Error::input(Place::file(&self.path), problem, help));
+            }
+            let present = (0..order.len()).filter(|role| columns.at[*role].is_some());
+            present.enumerate().for_each(|(position, role)| order[role] = position);
+        }
+        while self.source.step()? {
+            each(&SampleRow { columns, source: &self.source, order: &order })?;
+        }
         match self.source {
-            RowSource::Text(mut table) => {
-                while table.next_row()? {
-                    each(&SampleRow { columns, source: Line::Text(&table) })?;
-                }
-                table.finish()
-            }
-            RowSource::Parquet(mut reader) => {
-                let wanted: Vec<usize> = columns.at.iter().flatten().map(|(at, _)| *at).collect();
-                reader.rows.want(&wanted)?;
-                if reader.rows.has_lists() {
-                    let problem = "the cells of a column are lists; a row is one vehicle at one time";
-                    let help = "make such a table in Python: `lanesweep.tracks.lists`, or `swiftraj`";
-                    return Err(Error::input(Place::file(&self.path), problem, help));
-                }
-                let mut order = [0; Role::ALL.len()];
-                let present = (0..order.len()).filter(|role| columns.at[*role].is_some());
-                present.enumerate().for_each(|(position, role)| order[role] = position);
-                let mut rows = 0;
-                while reader.rows.step()? {
-                    rows += 1;
-                    let source = Line::Parquet { reader: &reader, row: rows, order: &order };
-                    each(&SampleRow { columns, source })?;
-                }
-                FileChecksum::of(&self.path)
-            }
+            RowSource::Text(table) => table.finish(),
+            RowSource::Parquet(_) => FileChecksum::of(&self.path),
+        }
+    }
+}
+
+impl RowSource {
+    fn step(&mut self) -> Result<bool> {
+        match self {
+            RowSource::Text(table) => table.next_row(),
+            RowSource::Parquet(reader) => reader.rows.step(),
         }
     }
 }
@@ -211,26 +212,18 @@ impl Rows {
 /// One sample of one vehicle.
 pub(super) struct SampleRow<'a> {
     pub columns: &'a Columns,
-    source: Line<'a>,
-}
-
-enum Line<'a> {
-    Text(&'a CsvTable),
-    Parquet {
-        reader: &'a TableReader,
-        row: u64,
-        /// Position of each role's column in the selection.
-        order: &'a [usize],
-    },
+    source: &'a RowSource,
+    /// Position of each role's column in the selection of a Parquet file.
+    order: &'a [usize],
 }
 
 impl SampleRow<'_> {
     /// The value of a column; one of several that `;` joins counts, the first.
     fn cell(&self, role: Role) -> TableCell<'_> {
         let Some((at, _)) = self.columns.at[role as usize] else { return TableCell::Null };
-        match &self.source {
-            Line::Text(table) => TableCell::Text(String::from_utf8_lossy(first_of(table.bytes(at)))),
-            Line::Parquet { reader, order, .. } => match reader.rows.cell(order[role as usize]) {
+        match self.source {
+            RowSource::Text(table) => TableCell::Text(String::from_utf8_lossy(first_of(table.bytes(at)))),
+            RowSource::Parquet(reader) => match reader.rows.cell(self.order[role as usize]) {
                 TableCell::Text(Cow::Borrowed(text)) => TableCell::Text(Cow::Borrowed(text.trim())),
                 cell => cell,
             },
@@ -241,7 +234,7 @@ impl SampleRow<'_> {
     pub(super) fn number(&self, role: Role) -> Result<Option<f64>> {
         let si = |value: f64, text: &dyn Fn() -> String| self.columns.si(value, role, text, || self.place(role));
         // Most values, without a text.
-        if let (Line::Text(table), Some((at, _))) = (&self.source, self.columns.at[role as usize])
+        if let (RowSource::Text(table), Some((at, _))) = (self.source, self.columns.at[role as usize])
             && !table.has_decimal_commas
             && let Some(value) = number::short_decimal(table.bytes(at))
         {
@@ -259,7 +252,7 @@ impl SampleRow<'_> {
     /// A number in SI units of a text.
     fn number_of(&self, text: &str, role: Role) -> Result<Option<f64>> {
         let (columns, mut text) = (self.columns, Cow::Borrowed(text));
-        if let Line::Text(table) = self.source
+        if let RowSource::Text(table) = self.source
             && table.has_decimal_commas
             && !text.contains(':')
         {
@@ -308,9 +301,9 @@ impl SampleRow<'_> {
 
     /// The place of a value.
     pub(super) fn place(&self, role: Role) -> Place {
-        let place = match &self.source {
-            Line::Text(table) => table.place(),
-            Line::Parquet { reader, row, .. } => reader.place(*row, None),
+        let place = match self.source {
+            RowSource::Text(table) => table.place(),
+            RowSource::Parquet(reader) => reader.place(reader.rows.number(), None),
         };
         place.column(self.columns.name(role))
     }
