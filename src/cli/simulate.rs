@@ -14,6 +14,7 @@ use super::{Exit, Output};
 use lanesweep_report::openscenario::{Concrete, PlayOptions, concrete_case};
 use lanesweep_report::trace::TraceReport;
 use lanesweep_run::reopen::{Reopened, TracedLanes};
+use lanesweep_support::atomic_file::folder_of;
 use lanesweep_support::files::{file_name, write_atomically};
 use lanesweep_support::run_folder::is_listed;
 use lanesweep_support::{Error, Place, Result, option};
@@ -173,10 +174,7 @@ impl Simulate {
             let problem = format!("{until} s is out of range for a time axis");
             return Err(Error::usage(Place::option("plot_end"), problem, "give seconds above 0 and below 10^9"));
         }
-        let is_of_run = |dir: &Path| {
-            plot.parent().map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p }) == Some(dir)
-                && plot.file_name().and_then(|name| name.to_str()).is_some_and(|name| is_listed(dir, name))
-        };
+        let is_of_run = |dir: &Path| folder_of(plot) == dir && is_listed(dir, &file_name(plot));
         if self.from.as_deref().is_some_and(is_of_run) {
             let problem = format!("{} is a result of the run", plot.display());
             return Err(Error::usage(Place::option("plot"), problem, "choose another name"));

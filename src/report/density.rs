@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::records::{record, sorted};
 use lanesweep_stats::density::{DensityModel, Exposure, Rate, Refused, SearchEnd, ValidFraction, standard_deviation};
-use lanesweep_support::readable::{count, count_of, significant};
+use lanesweep_support::readable::{count, significant};
 use lanesweep_support::table::{Column, Digits, Table};
 
 /// One density without its kernels.
@@ -19,7 +19,7 @@ pub fn text(model: &DensityModel) -> String {
         id.category.label(),
         id.key,
         id.description(),
-        count_of(model.kde.points().len()),
+        count(model.kde.points().len()),
         count(provenance.found),
         count(provenance.kept),
         count(provenance.left_out)

@@ -12,7 +12,7 @@ use lanesweep_model::scenario::parameterization::Parameterization;
 use lanesweep_run::sampling::{EstimateRow, RiskRate, Sample, SampleResult, proposal_text};
 use lanesweep_stats::estimate::{IntervalKind, WeightFigures};
 use lanesweep_support::Result;
-use lanesweep_support::readable::{count, count_of, counted, significant, value};
+use lanesweep_support::readable::{count, counted, significant, value};
 use lanesweep_support::run_folder::{ResultFiles, Results};
 use lanesweep_support::table::{Column, Digits, NumberText, Table, TableOf};
 
@@ -133,7 +133,7 @@ impl<'a> SampleReport<'a> {
             text,
             "{}: density over {} scenarios ({})",
             self.name(),
-            count_of(density.kde.points().len()),
+            count(density.kde.points().len()),
             density.provenance.data
         );
         if let Some((tally, plan)) = self.drawn() {

@@ -5,7 +5,7 @@ use super::sampling::SampleReport;
 use lanesweep_model::criterion::Criterion;
 use lanesweep_run::sampling::EstimateRow;
 use lanesweep_support::Result;
-use lanesweep_support::readable::{count, count_of, significant, value};
+use lanesweep_support::readable::{count, significant, value};
 
 impl SampleReport<'_> {
     /// `report.html`.
@@ -32,7 +32,7 @@ impl SampleReport<'_> {
                 "{}{} samples of a density over {} mined scenarios, estimator {}, profile {}. {}",
                 self.sentence(),
                 count(drawn),
-                count_of(density.kde.points().len()),
+                count(density.kde.points().len()),
                 match self.has_rare() {
                     true => format!("{}, rare failures by is", self.sample.options.estimator.key()),
                     false => self.sample.options.estimator.key().to_owned(),

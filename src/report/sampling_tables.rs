@@ -8,7 +8,7 @@ use lanesweep_run::sampling::{
     BandwidthVerdict, CarrierRow, Checkpoint, EstimateRow, RiskRate, TRAFFIC_DRAWS, Uncertainty,
 };
 use lanesweep_stats::estimate::{Ratio, Warning, WeightFigures};
-use lanesweep_support::readable::{count, count_of, counted, significant};
+use lanesweep_support::readable::{count, counted, significant};
 use lanesweep_support::table::{NamedValue, Table};
 
 impl SampleReport<'_> {
@@ -238,7 +238,7 @@ impl SampleReport<'_> {
         let kernels = self.sample.density.kde.points().len();
         let is_below = self.estimates().iter().any(|row| row.is_overall(self.estimates()) && row.is_of_tails(kernels));
         is_below.then(|| {
-            let (resolved, kernels) = (short(1.0 / kernels as f64), count_of(kernels));
+            let (resolved, kernels) = (short(1.0 / kernels as f64), count(kernels));
             format!("Probabilities below {resolved} (one in {kernels} scenarios) come from the tails of the density's kernels, not from data")
         })
     }

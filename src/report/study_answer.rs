@@ -7,7 +7,7 @@ use super::tables::{reference_text, wrap};
 use lanesweep_engine::Headway;
 use lanesweep_model::scenario::Category;
 use lanesweep_run::score::{Best, BestScore, CategoryScores};
-use lanesweep_support::readable::{count, count_of, counted, significant};
+use lanesweep_support::readable::{count, counted, significant};
 use lanesweep_support::table::{NumberText, Table};
 
 /// Width of the screen in columns, and minimum width of a narrower one.
@@ -208,7 +208,7 @@ impl StudyReport<'_> {
         }
         let more = self.evaluation.best.len().saturating_sub(MAX_ROWS);
         if more > 0 {
-            lines.push(format!("… and {} more: results.csv", count_of(more)));
+            lines.push(format!("… and {} more: results.csv", count(more)));
         }
         lines
     }

@@ -250,7 +250,7 @@ pub(super) fn claim_records(results: &[ClaimResult], data: &str) -> Table {
 pub(super) fn reference_text(comparison: &ReferenceComparison) -> String {
     let mut text = format!(
         "f32 against the f64 reference: {} of {} verdicts differ ({} lanes; the cap differs in {})\n",
-        readable::count_of(comparison.differences.len()),
+        readable::count(comparison.differences.len()),
         readable::count(comparison.lanes * Criterion::ALL.len() as u64),
         readable::count(comparison.lanes),
         readable::count(comparison.cap_differs)

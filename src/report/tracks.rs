@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::plot::{Figure, Plot, PlotAxis, Rule};
 use super::tables::wrap;
-use lanesweep_support::readable::count_of;
+use lanesweep_support::readable::count;
 use lanesweep_support::table::WIDTH;
 use lanesweep_traffic::mining::{CategoryCount, counts_text};
 use lanesweep_traffic::trajectory::tracks::Understanding;
@@ -97,7 +97,7 @@ pub fn across(recording: &Recording) -> Figure {
         rules.retain(|rule| !rule.runs.is_empty());
         let (low, high) = range(&mut rules.iter().flat_map(|rule| rule.runs.iter().flatten().map(|point| point.1)));
         plots.push(Plot {
-            heading: format!("carriageway {}, {} tracks", carriageway.name, count_of(tracks.len())),
+            heading: format!("carriageway {}, {} tracks", carriageway.name, count(tracks.len())),
             x: PlotAxis::new("position along the road, m", 0.0, (end - begin).max(1.0)),
             y: PlotAxis::new("position from the left edge of the leftmost lane, m", low, high),
             rules,

@@ -162,9 +162,9 @@ fn shown(column: &Column, cell: &Cell) -> String {
         Cell::Null => column.null.to_owned(),
         Cell::Text(text) => text.to_string(),
         Cell::Flag(flag) => if *flag { "yes" } else { "no" }.to_owned(),
-        Cell::Whole(number) => readable::whole(*number),
+        Cell::Whole(number) => readable::count(*number),
         Cell::Number(number) => column.digits.text(*number),
         Cell::Series(series) => series.iter().map(|number| column.digits.text(*number)).collect::<Vec<_>>().join(" "),
-        Cell::Wholes(numbers) => numbers.iter().map(|number| readable::whole(*number)).collect::<Vec<_>>().join(" "),
+        Cell::Wholes(numbers) => numbers.iter().map(|number| readable::count(*number)).collect::<Vec<_>>().join(" "),
     }
 }
