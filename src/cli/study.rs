@@ -9,7 +9,6 @@ use super::configured::Configured;
 use super::console;
 use super::format::FormatFlag;
 use super::settings::KeepPlan;
-use super::shard_flags::ShardFlags;
 use super::source::{SourceFlags, check_lane_table};
 use super::{COMMIT, Exit, Output, lists};
 use lanesweep_engine::{Chunk, Headway, LanePlan, OpenBackend};
@@ -83,7 +82,7 @@ pub(super) struct Study {
     #[command(flatten)]
     format: FormatFlag,
     #[command(flatten)]
-    shards: ShardFlags,
+    shards: lists::ShardFlags,
 }
 
 impl Study {

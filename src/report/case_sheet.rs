@@ -5,8 +5,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::case_evidence::assumptions;
-use super::case_identity::{CaseIdentity, NOT_CONSIDERED, profile_sha256};
+use super::case_evidence::{CaseIdentity, NOT_CONSIDERED, assumptions, profile_sha256};
 use super::html::{Page, PageFigure, Section};
 use super::lanes::{outcome_record, with_outcomes};
 use super::records::{self, PROGRAM, record};

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use super::case_identity::program;
+use super::case_evidence::program;
 use super::html::Section;
 use lanesweep_engine::{DeviceRecord, OpenBackend, SweepSummary};
 use lanesweep_model::profile::Profile;

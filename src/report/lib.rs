@@ -4,21 +4,18 @@
 //! `run.json`. It computes nothing beyond formatting. Scores come from [`lanesweep_run::score`]; text and files go to the
 //! user.
 
-mod case_evidence;
-pub mod case_identity;
+pub mod case_evidence;
 mod case_sensitivity;
 mod case_sentences;
 pub mod case_sheet;
 pub mod case_table;
 pub mod column_words;
 pub mod density;
-mod dots;
 mod explorer;
 pub mod host;
 mod html;
 pub mod lanes;
 pub mod map;
-mod map_record;
 mod map_sheet;
 mod map_tables;
 pub mod openscenario;

@@ -1,7 +1,8 @@
 //! The figures of a study: F1 with intervals and as the radar chart of the paper.
 
-use super::dots::dots;
-use super::plot::{Figure, Look, Mark, Name, Plot, PlotAxis, Series, Value, is_few};
+use super::plot::{
+    Figure, GREY, Height, Look, Mark, Name, Plot, PlotAxis, Rule, Series, Value, is_few, name_height_px,
+};
 use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::scenario::Category;
@@ -139,4 +140,50 @@ pub(super) fn variant_name(category: Category, key: &str) -> String {
 /// The key of the parameterization of a variant.
 pub(super) fn short_name(key: &str) -> &str {
     key.strip_suffix(CROSS_VALIDATED).unwrap_or(key)
+}
+
+/// Height of a line, and of the space below a row, px.
+const LINE_PX: f64 = 8.0;
+const ROW_GAP_PX: f64 = 12.0;
+
+/// A plot of rows with a name at the left and a note at the right. Values have the index of their row as y; an estimate is
+/// at x, its intervals along it.
+fn dots(rows: &[(String, String)], x: PlotAxis, series: Vec<Series>) -> Plot {
+    let lines = series.len();
+    let names_px = rows.iter().map(|(words, _)| name_height_px(words) + 6.0).fold(24.0, f64::max);
+    let row_px = (lines as f64 * LINE_PX + ROW_GAP_PX).max(names_px);
+    let height_px = rows.len() as f64 * row_px;
+    let name = |(index, (words, note)): (usize, &(String, String))| Name {
+        at: -(index as f64 * row_px),
+        words: words.clone(),
+        note: note.clone(),
+        ..Name::default()
+    };
+    let line = |(line, series): (usize, Series)| {
+        let look = series.look.unwrap_or_else(|| Look::of(line, lines));
+        let value = |value: Value| {
+            let y = -(value.y * row_px) - ROW_GAP_PX / 2.0 - (line as f64 + 0.5) * LINE_PX;
+            Value { y, ..value }
+        };
+        Series {
+            values: series.values.into_iter().map(value).collect(),
+            marks: vec![Mark::Points, Mark::Intervals],
+            look: Some(Look { line_px: 1.4, marker_px: 3.8, ..look }),
+            ..series
+        }
+    };
+    let separators = Rule {
+        runs: (1..rows.len()).map(|row| [0.0, f64::MAX].map(|x| (x, -(row as f64 * row_px))).to_vec()).collect(),
+        colour: GREY,
+        width_px: 0.5,
+        ..Rule::default()
+    };
+    Plot {
+        x,
+        y: PlotAxis { names: rows.iter().enumerate().map(name).collect(), ..PlotAxis::new("", -height_px, 0.0) },
+        rules: vec![separators],
+        series: series.into_iter().enumerate().map(line).collect(),
+        height: Height::Px(height_px),
+        ..Plot::default()
+    }
 }

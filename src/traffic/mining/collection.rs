@@ -94,11 +94,8 @@ impl Collection {
 
 /// Found and kept scenarios of a category.
 pub fn count(scenarios: &[Scenario], category: Category) -> CategoryCount {
-    let of = scenarios.iter().filter(|s| s.category == category);
-    of.fold(CategoryCount::default(), |sum, s| CategoryCount {
-        found: sum.found + 1,
-        kept: sum.kept + u64::from(s.kept),
-    })
+    let of = || scenarios.iter().filter(|s| s.category == category);
+    CategoryCount { found: of().count() as u64, kept: of().filter(|s| s.kept).count() as u64 }
 }
 
 /// Found and kept scenarios of every category, in their order.

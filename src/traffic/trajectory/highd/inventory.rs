@@ -127,8 +127,13 @@ fn prefixes(dir: &Path) -> Result<BTreeMap<String, [bool; 3]>> {
 fn nothing_complete(dir: &Path, mut problems: Vec<Error>) -> Error {
     match problems.len() {
         0 => {
-            let inner: Vec<String> =
-                subfolders_with_recordings(dir).iter().map(|of| of.display().to_string()).collect();
+            // The highD archive unpacks into `data/`, and simulations have a folder for each run.
+            let has_tracks =
+                |folder: &PathBuf| files_of(folder).is_ok_and(|all| all.iter().any(|of| may_hold_tracks(of)));
+            let listed = fs::read_dir(dir).into_iter().flatten().flatten().map(|entry| entry.path());
+            let inner = listed.filter(|folder| folder.is_dir()).filter(has_tracks);
+            let mut inner: Vec<String> = inner.map(|of| of.display().to_string()).collect();
+            inner.sort();
             let help = match &inner[..] {
                 [] => "name a folder with highD-format recordings".to_owned(),
                 [inner] => format!("the folder {inner} has recordings: name that one"),
@@ -147,15 +152,4 @@ fn nothing_complete(dir: &Path, mut problems: Vec<Error>) -> Error {
             "every recording needs NN_tracks.csv, NN_tracksMeta.csv and NN_recordingMeta.csv",
         ),
     }
-}
-
-/// The highD archive unpacks into `data/`, and simulations have a folder for each run, so users often name the outer one.
-fn subfolders_with_recordings(dir: &Path) -> Vec<PathBuf> {
-    let listed = fs::read_dir(dir).into_iter().flatten().flatten().map(|entry| entry.path());
-    let is_such = |folder: &PathBuf| {
-        folder.is_dir() && files_of(folder).is_ok_and(|all| all.iter().any(|of| may_hold_tracks(of)))
-    };
-    let mut folders: Vec<PathBuf> = listed.filter(is_such).collect();
-    folders.sort();
-    folders
 }
