@@ -1,7 +1,5 @@
 //! A sampling run as files and as text.
 
-use std::fmt::Write;
-
 use super::host::Host;
 use super::records::{PROGRAM, document, publish, record};
 use super::sampling_tables::convergence_table;
@@ -127,26 +125,18 @@ impl<'a> SampleReport<'a> {
 
     /// The text for the terminal.
     pub fn text(&self) -> String {
-        let mut text = String::new();
         let density = &self.sample.density;
-        let _ = writeln!(
-            text,
-            "{}: density over {} scenarios ({})",
-            self.name(),
-            count(density.kde.points().len()),
-            density.provenance.data
-        );
+        let (scenarios, data) = (count(density.kde.points().len()), &density.provenance.data);
+        let mut text = format!("{}: density over {scenarios} scenarios ({data})\n", self.name());
         if let Some((tally, plan)) = self.drawn() {
             let some = |count: u64, text: String| if count > 0 { text } else { String::new() };
             let (voids, capped) = (tally.voids, tally.capped.iter().sum());
-            let _ = writeln!(
-                text,
-                "{} samples, {} lanes; {:.2} % of the draws invalid and drawn again{}{}",
-                count(tally.samples()),
-                count(lanes(tally, plan)),
-                100.0 * rejected(tally),
-                some(voids, format!(", {} samples void (none of {ATTEMPTS} draws valid)", count(voids))),
-                some(capped, format!("; {} lanes ended at the time cap", count(capped))),
+            let void = some(voids, format!(", {} samples void (none of {ATTEMPTS} draws valid)", count(voids)));
+            let capped = some(capped, format!("; {} lanes ended at the time cap", count(capped)));
+            let ([samples, lanes], percent) =
+                ([tally.samples(), lanes(tally, plan)].map(count), 100.0 * rejected(tally));
+            text += &format!(
+                "{samples} samples, {lanes} lanes; {percent:.2} % of the draws invalid and drawn again{void}{capped}\n"
             );
         }
         text.push_str(&self.table(|row| row.is_overall(self.estimates())).text());
@@ -159,21 +149,14 @@ impl<'a> SampleReport<'a> {
             text += &paragraph(note);
         }
         let is_compared = self.estimates().iter().any(|row| row.recorded.is_some_and(|of| of.sampled.is_some()));
-        let rest = format!(
-            "Intervals at {} %: of the draws, and{}. {}{}",
-            value(100.0 * self.level()),
-            self.interval_rule(),
-            if is_compared {
-                "P/S, beside the recorded scenarios: = agrees, > too high, < too low, ? undecided. "
-            } else {
-                ""
-            },
-            match notes.len().saturating_sub(MAX_NOTES) {
-                0 => "More on the page.".to_owned(),
-                more => format!("{} and more on the page.", counted(more, "further note")),
-            }
-        );
-        text += &paragraph(&rest);
+        let marks = "P/S, beside the recorded scenarios: = agrees, > too high, < too low, ? undecided. ";
+        let more = match notes.len().saturating_sub(MAX_NOTES) {
+            0 => "More".to_owned(),
+            more => format!("{} and more", counted(more, "further note")),
+        };
+        let (level, rule, marks) =
+            (value(100.0 * self.level()), self.interval_rule(), if is_compared { marks } else { "" });
+        text += &paragraph(&format!("Intervals at {level} %: of the draws, and{rule}. {marks}{more} on the page."));
         if density.provenance.synthetic {
             text.push_str("SYNTHETIC DATA: no number above is a statement about real traffic\n");
         }
