@@ -8,7 +8,7 @@ use super::case_sheet::{CaseSheet, signed};
 use super::html::Section;
 use super::lanes::outcome_record;
 use super::records::{self, PROGRAM, record};
-use super::tables::{WIDTH, wrap};
+use super::tables::indented;
 use lanesweep_engine::version::Canonical;
 use lanesweep_engine::{ENGINE_VERSION, Outcome};
 use lanesweep_model::assumptions::Assumption;
@@ -58,15 +58,12 @@ impl CaseSheet<'_> {
             Some(format!("program: {}", program(self.identity.commit, 12))),
             self.identity.file_sha256.as_ref().map(|sha256| format!("file: {}", short(Ok(sha256.clone())))),
             Some(format!("case: {}", self.mark())),
-            Some(
-                wrap(&format!("profiles: {}", profiles.collect::<Vec<_>>().join(", ")), WIDTH - 2)
-                    .replace('\n', "\n  "),
-            ),
+            Some(format!("profiles: {}", profiles.collect::<Vec<_>>().join(", "))),
             self.identity.date.as_ref().map(|date| format!("date: {date}")),
             self.identity.author.as_ref().map(|author| format!("author: {author}")),
         ];
-        let parts: Vec<String> = parts.into_iter().flatten().map(|part| format!("  {part}\n")).collect();
-        format!("Identity, with the first 12 digits of each SHA-256\n{}", parts.concat())
+        let parts: String = parts.into_iter().flatten().map(|part| indented(&part)).collect();
+        format!("Identity, with the first 12 digits of each SHA-256\n{parts}")
     }
 
     /// The sheet's identity for programs.

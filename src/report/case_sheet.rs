@@ -9,7 +9,7 @@ use super::case_evidence::{CaseIdentity, NOT_CONSIDERED, assumptions, profile_sh
 use super::html::{Page, PageFigure, Section};
 use super::lanes::{outcome_record, with_outcomes};
 use super::records::{self, PROGRAM, record};
-use super::tables::{WIDTH, wrap};
+use super::tables::{WIDTH, indented, wrap};
 use super::trace::{TraceFigure, TraceSeries};
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::profile::Profile;
@@ -92,11 +92,14 @@ impl CaseSheet<'_> {
         list
     }
 
+    /// The drivers by profile.
+    fn judged(&self) -> impl Iterator<Item = (&Judgement, &Judged)> {
+        self.judgements.iter().flat_map(|judgement| judgement.models.iter().map(move |judged| (judgement, judged)))
+    }
+
     fn drivers(&self) -> Table {
-        let judged =
-            self.judgements.iter().flat_map(|judgement| judgement.models.iter().map(move |of| (judgement, of)));
         let contact = |judged: &Judged| judged.trace.contact_label().split(' ').next();
-        let table = Table::of(judged)
+        let table = Table::of(self.judged())
             .column("profile", |(judgement, _)| judgement.profile.as_str())
             .column("model", |(_, judged)| judged.trace.model.name())
             .column("collision", |(judgement, judged)| verdict_of(judgement, judged))
@@ -177,55 +180,43 @@ impl CaseSheet<'_> {
     /// The answer on one screen.
     pub fn brief(&self) -> String {
         let sentences = self.demand().into_iter().chain(self.silent()).chain(self.cautions());
-        let sentences = sentences.map(|sentence| format!("  {}\n", wrap(&sentence, WIDTH - 2).replace('\n', "\n  ")));
-        let [drivers, _] = self.drivers_by_profile();
+        let sentences: String = sentences.map(|sentence| indented(&sentence)).collect();
+        let ([drivers, _], boundaries) = (self.drivers_by_profile(), self.boundaries().text());
+        let (head, drivers, [full, sheet]) = (self.head(), drivers.text(), ["full", "sheet"].map(option));
         format!(
-            "{}{}{}Where another answer begins, all else equal; the last columns: another collision\n{}\
-             Other profiles, clauses, readings and hashes: {}, or a page to print: {}\n",
-            self.head(),
-            sentences.collect::<String>(),
-            drivers.text(),
-            self.boundaries().text(),
-            option("full"),
-            option("sheet"),
+            "{head}{sentences}{drivers}Where another answer begins, all else equal; the last columns: another collision\n{boundaries}\
+             Other profiles, clauses, readings and hashes: {full}, or a page to print: {sheet}\n"
         )
     }
 
     /// The sheet as text.
     pub fn text(&self) -> String {
         let numbers: String = self.numbers().iter().map(|(name, number)| format!("  {name}: {number}\n")).collect();
-        let cautions = self
-            .rule()
-            .into_iter()
-            .chain(self.cautions())
-            .map(|caution| wrap(&caution, WIDTH - 2).replace('\n', "\n  "));
-        let sentences = self.demand().into_iter().chain(self.silent()).chain(cautions);
-        let sentences: String = sentences.map(|sentence| format!("  {sentence}\n")).collect();
+        let cautions = self.rule().into_iter().chain(self.cautions()).map(|caution| indented(&caution));
+        let unwrapped = self.demand().into_iter().chain(self.silent()).map(|sentence| format!("  {sentence}\n"));
+        let (head, sentences, profile) =
+            (self.head(), unwrapped.chain(cautions).collect::<String>(), &self.first().profile);
+        let [drivers, clauses, boundaries] =
+            [self.drivers(), self.clauses(), self.boundaries()].map(|table| table.text());
+        let of_drivers = wrap(&format!("Drivers. {DRIVERS}"), WIDTH);
+        let of_boundaries = wrap(&format!("Where the answer changes under {profile}. {BOUNDARIES}"), WIDTH);
+        let (by_rule, identity) = (self.by_rule_text(), self.identity_text());
         format!(
-            "{}{sentences}{numbers}\n{}\n{}\nClauses under {}\n{}\n{}\n{}\n{}",
-            self.head(),
-            wrap(&format!("Drivers. {DRIVERS}"), WIDTH),
-            self.drivers().text(),
-            self.first().profile,
-            self.clauses().text(),
-            wrap(&format!("Where the answer changes under {}. {BOUNDARIES}", self.first().profile), WIDTH),
-            self.boundaries().text() + &self.by_rule_text(),
-            self.identity_text(),
+            "{head}{sentences}{numbers}\n{of_drivers}\n{drivers}\nClauses under {profile}\n{clauses}\n{of_boundaries}\n\
+             {boundaries}{by_rule}\n{identity}"
         )
     }
 
     /// A row per driver and profile, per constant, and per rule.
     pub fn tables(&self) -> Vec<NamedTable> {
-        let drivers = self.judgements.iter().flat_map(|of| of.models.iter().map(move |judged| (of, judged)));
-        let drivers: Vec<_> = drivers.collect();
-        let profiles = Table::of(drivers.iter().copied())
+        let profiles = Table::of(self.judged())
             .column("profile", |(of, _)| of.profile.as_str())
             .column("verdict", |(of, _)| of.verdict().label())
             .column("model", |(_, judged)| judged.trace.model.name())
             .column("braking_s", |(_, judged)| judged.braking_s())
             .column("changes_with", |(_, judged)| judged.flips.join(", "))
             .column("is_contact_like", |(_, judged)| judged.touches);
-        let profiles = with_outcomes(profiles.build(), drivers.iter().map(|(_, judged)| &judged.trace));
+        let profiles = with_outcomes(profiles.build(), self.judged().map(|(_, judged)| &judged.trace));
         let tables =
             [("profiles", profiles), ("assumptions", assumptions(&self.profiles[0])), ("by_rule", self.rule_rows())];
         tables.map(|(name, table)| (name.to_owned(), table)).into()

@@ -26,19 +26,15 @@ impl SampleReport<'_> {
         // Importance sampling seldom needs the maximum that it may draw; its runs include the search.
         let runs = self.estimates().iter().map(|row| row.estimate.runs).max();
         let drawn = self.drawn().map(|(tally, _)| tally.samples()).or(runs).unwrap_or(self.sample.options.stop.samples);
+        let (highest, drawn, scenarios) = (self.sentence(), count(drawn), count(density.kde.points().len()));
+        let (profile, data) = (&self.sample.profile.name, &density.provenance.data);
+        let rare = if self.has_rare() { ", rare failures by is" } else { "" };
+        let estimator = self.sample.options.estimator.key();
         let page = Page {
             title: format!("Probability of failure: {}", self.name()),
             lead: format!(
-                "{}{} samples of a density over {} mined scenarios, estimator {}, profile {}. {}",
-                self.sentence(),
-                count(drawn),
-                count(density.kde.points().len()),
-                match self.has_rare() {
-                    true => format!("{}, rare failures by is", self.sample.options.estimator.key()),
-                    false => self.sample.options.estimator.key().to_owned(),
-                },
-                self.sample.profile.name,
-                density.provenance.data
+                "{highest}{drawn} samples of a density over {scenarios} mined scenarios, estimator {estimator}{rare}, profile \
+                 {profile}. {data}"
             ),
             synthetic: density.provenance.synthetic,
             warnings,

@@ -274,6 +274,11 @@ pub(super) fn paragraph(words: &str) -> String {
     wrap(words, WIDTH) + "\n"
 }
 
+/// A paragraph, indented.
+pub(super) fn indented(words: &str) -> String {
+    format!("  {}\n", wrap(words, WIDTH - 2).replace('\n', "\n  "))
+}
+
 /// The text wrapped between words; a longer word stays whole.
 pub(crate) fn wrap(text: &str, width: usize) -> String {
     let (mut wrapped, mut column) = (String::new(), 0);
