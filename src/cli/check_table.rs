@@ -76,7 +76,7 @@ impl CheckedTable<'_> {
         unchanged(self.path)?;
         cases.retain(|case: &CaseAnswer| {
             let before = broken.len();
-            broken.extend(case.id().and_then(|id| table.refused_later(id)));
+            broken.extend(case.id.as_deref().and_then(|id| table.refused_later(id)));
             broken.len() == before
         });
         doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));

@@ -228,11 +228,8 @@ fn resolve(target: &Path) -> Result<PathBuf> {
     let Ok(kind) = std::fs::metadata(target) else { return Ok(target.to_path_buf()) };
     if !kind.is_file() {
         let what = if kind.is_dir() { "a folder" } else { "a device or pipe" };
-        return Err(Error::usage(
-            Place::file(target),
-            format!("this is {what}, and a result is written to a file of its own"),
-            "give the path of a file",
-        ));
+        let problem = format!("this is {what}, and a result is written to a file of its own");
+        return Err(Error::usage(Place::file(target), problem, "give the path of a file"));
     }
     std::fs::canonicalize(target).map_err(|source| Error::io(target, "write", source))
 }

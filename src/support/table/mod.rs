@@ -85,11 +85,8 @@ impl TableFormat {
             Some(format) => Ok(*format),
             None => {
                 let known: Vec<String> = usable.iter().map(|format| format!(".{}", format.endings()[0])).collect();
-                Err(Error::usage(
-                    place(),
-                    format!("`.{ending}` is no format of tables here"),
-                    format!("use a name that ends in {}", or_list(&known)),
-                ))
+                let help = format!("use a name that ends in {}", or_list(&known));
+                Err(Error::usage(place(), format!("`.{ending}` is no format of tables here"), help))
             }
         }
     }

@@ -209,7 +209,10 @@ impl FoundScenario<'_> {
             target: self.other(self.target, side)?,
             thw0: (v0 > 0.0).then(|| gap0 / v0),
             gap0: Some(gap0),
-            peak_decel: Some(peak_deceleration(&self.target.a_s_mps2[first..=last])),
+            // Negative where the vehicle accelerates throughout.
+            peak_decel: Some(
+                self.target.a_s_mps2[first..=last].iter().map(|a| -a).fold(f64::NEG_INFINITY, f64::max) + 0.0,
+            ),
             synthetic: recording_tags.recording.synthetic,
             ..Scenario::default()
         })
@@ -242,9 +245,4 @@ pub(super) fn speed(v_mps: f64) -> f64 {
 /// would differ in the last bits.
 pub(super) fn micrometres(length_m: f64) -> f64 {
     (length_m * 1e6).round() / 1e6 + 0.0 // + 0.0: no negative zero
-}
-
-/// Largest deceleration, m/s²; negative where the vehicle accelerates throughout.
-fn peak_deceleration(a_mps2: &[f64]) -> f64 {
-    a_mps2.iter().fold(f64::NEG_INFINITY, |peak, &a| peak.max(-a)) + 0.0
 }

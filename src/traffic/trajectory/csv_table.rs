@@ -102,13 +102,11 @@ impl CsvTable {
             is_plain: input_file::is_plain(path)?,
         };
         if !table.read_line()? {
-            return Err(Error::input(
-                Place::file(path),
-                "the file is empty; expected a header line with column names",
-                "copy or export the file again",
-            ));
+            let problem = "the file is empty; expected a header line with column names";
+            return Err(Error::input(Place::file(path), problem, "copy or export the file again"));
         }
-        table.header = table.record.iter().map(header_name).collect();
+        let name = |field| String::from_utf8_lossy(field).trim().trim_start_matches('\u{feff}').to_owned();
+        table.header = table.record.iter().map(name).collect();
         table.check_header()?;
         Ok(table)
     }
@@ -121,10 +119,7 @@ impl CsvTable {
         if !self.read_line()? {
             return Ok(false);
         }
-        if self.record.len() != self.header.len() {
-            return Err(self.wrong_field_count());
-        }
-        Ok(true)
+        if self.record.len() == self.header.len() { Ok(true) } else { Err(self.wrong_field_count()) }
     }
 
     /// The column with this name.
@@ -135,11 +130,9 @@ impl CsvTable {
         self.optional_column(name)?.ok_or_else(|| {
             let strange: Vec<String> = self.strange_names().take(10).map(quoted).collect();
             let more = if self.strange_names().count() > strange.len() { ", …" } else { "" };
-            let others = match strange.is_empty() {
-                true => String::new(),
-                false => {
-                    format!("; the header has names that are not part of the format: {}{more}", strange.join(", "))
-                }
+            let others = match strange.join(", ") {
+                none if none.is_empty() => String::new(),
+                names => format!("; the header has names that are not part of the format: {names}{more}"),
             };
             let help = match self.similar_name(name) {
                 Some(similar) => format!("rename the column `{similar}` to `{name}`, if that is what it holds"),
@@ -285,9 +278,7 @@ impl CsvTable {
             }
             // The reader is on the line after the record, unless the record has no line end.
             let end_line = self.reader.position().line().saturating_sub(u64::from(!self.ends_open()));
-            let spans_lines = end_line > self.last_line + 1;
-            self.line = if spans_lines { end_line.saturating_sub(self.inner_line_ends()) } else { end_line };
-            self.last_line = end_line;
+            (self.line, self.last_line) = (end_line.saturating_sub(self.inner_line_ends()), end_line);
             if self.record.len() != 1 || !self.record[0].trim_ascii().is_empty() {
                 return Ok(true);
             }
@@ -339,10 +330,8 @@ impl CsvTable {
         let (place, found, expected) = (self.place(), self.record.len(), self.header.len());
         let has_open_quote = self.inner_line_ends() > 0;
         let (more, help) = if has_open_quote {
-            (
-                ": a quotation mark is opened and not closed on this line",
-                "remove the quotation mark; the format needs none",
-            )
+            let help = "remove the quotation mark; the format needs none";
+            (": a quotation mark is opened and not closed on this line", help)
         } else if found > expected {
             ("", "remove the surplus fields (a comma inside a number counts as a separator)")
         } else if self.ends_open() || matches!(self.reader.read_byte_record(&mut self.record), Ok(false)) {
@@ -362,11 +351,6 @@ impl CsvTable {
         let help = if std::str::from_utf8(field).is_ok() { "correct the value" } else { SAVE_AS_UTF8 };
         self.bad(column, format!("{} is not {expected}", self.shown(column)), help)
     }
-}
-
-/// A header field as a column name.
-fn header_name(field: &[u8]) -> String {
-    String::from_utf8_lossy(field).trim().trim_start_matches('\u{feff}').to_owned()
 }
 
 /// Text of a user's file in messages: quoted, without control characters, truncated.
@@ -396,8 +380,7 @@ impl Read for HashingReader {
             return Err(IS_ENDLESS.into());
         }
         let count = self.inner.read(buffer)?;
-        let read = &buffer[..count];
-        self.hash.update(read);
+        self.hash.update(&buffer[..count]);
         self.bytes += count as u64;
         self.at_end = count == 0;
         Ok(count)
