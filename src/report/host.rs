@@ -57,21 +57,9 @@ impl Host {
         Host { commit, backend, rechecked_lanes, threads, ..Host::default() }
     }
 
-    /// The chapter on what repeats a run.
+    /// The chapter on what repeats a run: what computed, whether a device computed as the CPU does, and the options that are not
+    /// the default.
     pub(super) fn section(&self, profile: &Profile) -> Section {
-        Section::new("reproduction", "Reproduction")
-            .intro(
-                "The same input, profile, options and program give the same numbers on any machine. The record beside this page \
-                 holds them, with checksums.",
-            )
-            .fact("program", program(self.commit, 40))
-            .fact("profile", &profile.name)
-            .host(self.facts())
-            .parts([Section::options("Profile", profile)])
-    }
-
-    /// What computed, whether a device computed as the CPU does, and the options that are not the default.
-    pub(super) fn facts(&self) -> Vec<(&'static str, String)> {
         let equal = match &self.device {
             None => "no device computed a lane".to_owned(),
             Some(device) if device.exact_path => format!("{}: operations reach the driver unchanged", device.line()),
@@ -85,10 +73,16 @@ impl Host {
         let set: Vec<String> =
             set.map(|setting| format!("{} = {} ({})", setting.key, setting.value, setting.source)).collect();
         let set = (!set.is_empty()).then(|| ("options that are set", set.join("\n")));
-        [("computed by", self.backend.clone()), ("GPU = CPU", equal), ("checked", again)]
-            .into_iter()
-            .chain(set)
-            .collect()
+        Section::new("reproduction", "Reproduction")
+            .intro(
+                "The same input, profile, options and program give the same numbers on any machine. The record beside this page \
+                 holds them, with checksums.",
+            )
+            .fact("program", program(self.commit, 40))
+            .fact("profile", &profile.name)
+            .host([("computed by", self.backend.clone()), ("GPU = CPU", equal), ("checked", again)])
+            .host(set)
+            .parts([Section::options("Profile", profile)])
     }
 
     /// The commit for records; null if unknown.

@@ -5,13 +5,11 @@
 //! user.
 
 pub mod case_evidence;
-mod case_sensitivity;
 mod case_sentences;
 pub mod case_sheet;
 pub mod case_table;
 pub mod column_words;
 pub mod density;
-mod explorer;
 pub mod host;
 mod html;
 pub mod lanes;
@@ -22,7 +20,6 @@ pub mod openscenario;
 mod plot;
 pub mod records;
 pub mod sampling;
-mod sampling_page;
 pub mod sampling_tables;
 pub mod study;
 mod study_answer;

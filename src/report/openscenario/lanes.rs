@@ -293,17 +293,12 @@ fn sizes_of_case<W: Real>(lane: &str, case: &LaneCase<W>, known: Option<&Sizes>,
         pairs.push(("sum of two lengths", known.ego.length_m + other.length_m, lengths[at]));
         pairs.push(("sum of two widths", known.ego.width_m + other.width_m, widths[at]));
     }
-    if let Some((what, expected, lane_has)) = pairs.iter().find(|(_, a, b)| (a - b).abs() > TOLERANCE_M) {
-        let problem = format!("the {what} is {expected} m by the scenarios and {lane_has} m in the run");
-        let help = format!(
-            "give the scenario file of the run ({}), or leave it out: every gap and contact stays",
-            option("scenarios")
-        );
-        return Err(Error::input(Place::item(format!("lane {lane}")), problem, help));
-    }
-    if is_pair && known.lead.is_none() {
-        let help = format!("give the scenario file of the run ({}), or leave it out", option("scenarios"));
-        return Err(Error::input(Place::item(format!("lane {lane}")), "the vehicle ahead has no size", help));
-    }
-    Ok(*known)
+    let problem = match pairs.iter().find(|(_, a, b)| (a - b).abs() > TOLERANCE_M) {
+        Some((what, known, run)) => format!("the {what} is {known} m by the scenarios and {run} m in the run"),
+        None if is_pair && known.lead.is_none() => "the vehicle ahead has no size".to_owned(),
+        None => return Ok(*known),
+    };
+    let scenarios = option("scenarios");
+    let help = format!("give the scenario file of the run ({scenarios}), or leave it out: every gap and contact stays");
+    Err(Error::input(Place::item(format!("lane {lane}")), problem, help))
 }
