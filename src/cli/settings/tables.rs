@@ -10,7 +10,7 @@ use lanesweep_model::driver::Bound;
 use lanesweep_model::scenario::parameterization::{ParameterizationOptions, SvdLateral};
 use lanesweep_run::score::ScoreOptions;
 use lanesweep_stats::density::{BandwidthRule, FitOptions};
-use lanesweep_support::settings;
+use lanesweep_support::config_tables;
 use lanesweep_traffic::mining::MiningOptions;
 use lanesweep_traffic::trajectory::generator::GeneratorOptions;
 
@@ -46,10 +46,8 @@ pub(crate) struct Settings {
     pub verify: VerifySettings,
 }
 
-settings! {
+config_tables! {
     /// Options of every verb.
-    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-    #[serde(deny_unknown_fields, default)]
     pub(crate) struct RunSettings {
         /// Threads; results do not depend on it. Without it: all cores.
         #[serde(skip_serializing_if = "Option::is_none")]
@@ -82,10 +80,8 @@ settings! {
     }
 }
 
-settings! {
+config_tables! {
     /// `lanesweep study`.
-    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-    #[serde(deny_unknown_fields, default)]
     pub(crate) struct StudySettings {
         /// Compute in binary64 on the CPU, not in the f32 lane arithmetic.
         pub reference: bool = false,
@@ -111,10 +107,8 @@ pub(crate) enum KeepPlan {
     Never,
 }
 
-settings! {
+config_tables! {
     /// `lanesweep fit`.
-    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-    #[serde(deny_unknown_fields, default)]
     pub(crate) struct FitSettings {
         /// Search interval of the bandwidth.
         pub bandwidth_rule: BandwidthRule = FitOptions::default().rule,
@@ -129,10 +123,8 @@ settings! {
     }
 }
 
-settings! {
+config_tables! {
     /// `lanesweep sample`.
-    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-    #[serde(deny_unknown_fields, default)]
     pub(crate) struct SampleSettings {
         /// Crude, importance, or the cheaper one. Importance sampling searches the failures, then draws
         /// around them; `auto` chooses for each model and headway, and is `mc` without a half-width.
@@ -197,10 +189,8 @@ pub(crate) enum EstimatorKind {
     Is,
 }
 
-settings! {
+config_tables! {
     /// `lanesweep map`.
-    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-    #[serde(deny_unknown_fields, default)]
     pub(crate) struct MapSettings {
         /// Compute in binary64 on the CPU, not in the f32 lane arithmetic.
         pub reference: bool = false,
@@ -211,10 +201,8 @@ settings! {
     }
 }
 
-settings! {
+config_tables! {
     /// `lanesweep verify`.
-    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-    #[serde(deny_unknown_fields, default)]
     pub(crate) struct VerifySettings {
         /// Units of 12 lanes per model, threshold and category.
         #[schemars(range(min = 1, max = 100_000))]

@@ -98,10 +98,9 @@ impl Concrete {
             let count = vehicle.path.len();
             if !(2..=MAX_VERTICES).contains(&count) {
                 let problem = format!("the path of {} has {count} vertices", vehicle.name);
-                let help = format!(
-                    "2 to {MAX_VERTICES} can be written: use a longer time step or a shorter {}",
-                    option("duration")
-                );
+                let duration = option("duration");
+                let help =
+                    format!("2 to {MAX_VERTICES} can be written: use a longer time step or a shorter {duration}");
                 return Err(Error::input(place(), problem, help));
             }
             let is_finite = |v: &Vertex| v.time_s.is_finite() && v.x_m.is_finite() && v.y_m.is_finite();

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 use super::csv_table::FileChecksum;
 use super::tracks::Understanding;
-use lanesweep_support::settings;
+use lanesweep_support::config_tables;
 
 /// One recording: a stretch of road over a period of time.
 #[derive(Debug, Clone, PartialEq)]
@@ -177,10 +177,9 @@ impl Recording {
 /// would give other scenarios.
 pub(crate) const LIMIT_TOLERANCE_M: f64 = 1e-6;
 
-settings! {
+config_tables! {
     /// Extent of an ego-centric view.
-    #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
-    #[serde(default, deny_unknown_fields)]
+    #[derive(Copy)]
     pub struct EgoViewOptions {
         /// Farthest along-road distance, centre to centre, at which another vehicle is in view, m. Paper: 100.
         #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e3))]
