@@ -34,7 +34,7 @@ pub fn load(path: &Path) -> lanesweep::Result<Vec<Loaded>> {
 }
 
 fn load_exid(dir: &Path) -> Loaded {
-    let detected = Inputs::of(dir, None).unwrap().preset().map(|preset| preset.name.clone());
+    let detected = Inputs::of(dir, None).unwrap().preset.map(|preset| preset.name);
     assert_eq!(detected.as_deref(), Some("exid"));
     load(dir).unwrap().remove(0)
 }
@@ -463,7 +463,7 @@ fn in_format_of(preset: &Preset, recording: &Recording, stride: usize, mistake: 
         format!("{:.6}", mistake(role, si, track) / factor)
     };
     let columns: Vec<(Role, &str)> =
-        preset.columns.iter().map(|(role, column)| (*role, column.names()[0].as_str())).collect();
+        preset.columns.iter().map(|(role, column)| (*role, column.names[0].as_str())).collect();
     let mut text = columns.iter().map(|(_, name)| *name).collect::<Vec<_>>().join(",") + "\n";
     for track in &recording.tracks {
         for k in (0..track.len()).filter(|k| (track.first_frame + *k as i64) % stride as i64 == 0) {
@@ -522,7 +522,7 @@ fn every_preset_reads_its_own_format_and_finds_mistakes_in_it() {
             let text = in_format_of(&preset, &recording, stride, mistake);
             match is_parquet {
                 #[cfg(feature = "parquet")]
-                true => write_parquet(&path, &text, &preset.columns[&Role::Vehicle].names()[0]),
+                true => write_parquet(&path, &text, &preset.columns[&Role::Vehicle].names[0]),
                 _ => std::fs::write(&path, text).unwrap(),
             }
             let file = TrackFile { path: path.clone(), id: "own".to_owned() };

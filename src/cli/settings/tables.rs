@@ -78,9 +78,7 @@ config_tables! {
         #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1e9))]
         pub stop_after_s: Option<f64> = None,
     }
-}
 
-config_tables! {
     /// `lanesweep study`.
     pub(crate) struct StudySettings {
         /// Compute in binary64 on the CPU, not in the f32 lane arithmetic.
@@ -93,21 +91,7 @@ config_tables! {
         #[schemars(range(min = 1, max = 100))]
         pub folds: usize = 5,
     }
-}
 
-/// When a run in one piece leaves its plan.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub(crate) enum KeepPlan {
-    /// Up to 256 MiB, about 135,000 scenarios.
-    Auto,
-    /// However large.
-    Always,
-    /// Never.
-    Never,
-}
-
-config_tables! {
     /// `lanesweep fit`.
     pub(crate) struct FitSettings {
         /// Search interval of the bandwidth.
@@ -121,9 +105,7 @@ config_tables! {
         #[schemars(range(min = 1, max = 1_000_000_000))]
         pub valid_draws: u64 = FitOptions::default().valid_draws,
     }
-}
 
-config_tables! {
     /// `lanesweep sample`.
     pub(crate) struct SampleSettings {
         /// Crude, importance, or the cheaper one. Importance sampling searches the failures, then draws
@@ -168,6 +150,35 @@ config_tables! {
         #[schemars(extend("x-flag" = "seed", "x-verbs" = ["sample"], "x-heading" = RUN))]
         pub seed: u64 = 157,
     }
+
+    /// `lanesweep map`.
+    pub(crate) struct MapSettings {
+        /// Compute in binary64 on the CPU, not in the f32 lane arithmetic.
+        pub reference: bool = false,
+        /// Only panels in which the ego is faster than the other vehicle; not of presets.
+        pub closing: bool = false,
+        /// Start each model at its following distance in the JRC's simulator, not gap_m or thw_s; not of presets.
+        pub native_gap: bool = false,
+    }
+
+    /// `lanesweep verify`.
+    pub(crate) struct VerifySettings {
+        /// Units of 12 lanes per model, threshold and category.
+        #[schemars(range(min = 1, max = 100_000))]
+        pub threshold_units: u64 = 64,
+    }
+}
+
+/// When a run in one piece leaves its plan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum KeepPlan {
+    /// Up to 256 MiB, about 135,000 scenarios.
+    Auto,
+    /// However large.
+    Always,
+    /// Never.
+    Never,
 }
 
 /// What importance sampling rests on.
@@ -187,25 +198,4 @@ pub(crate) enum EstimatorKind {
     Auto,
     Mc,
     Is,
-}
-
-config_tables! {
-    /// `lanesweep map`.
-    pub(crate) struct MapSettings {
-        /// Compute in binary64 on the CPU, not in the f32 lane arithmetic.
-        pub reference: bool = false,
-        /// Only panels in which the ego is faster than the other vehicle; not of presets.
-        pub closing: bool = false,
-        /// Start each model at its following distance in the JRC's simulator, not gap_m or thw_s; not of presets.
-        pub native_gap: bool = false,
-    }
-}
-
-config_tables! {
-    /// `lanesweep verify`.
-    pub(crate) struct VerifySettings {
-        /// Units of 12 lanes per model, threshold and category.
-        #[schemars(range(min = 1, max = 100_000))]
-        pub threshold_units: u64 = 64,
-    }
 }

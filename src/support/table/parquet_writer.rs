@@ -58,7 +58,7 @@ impl ParquetFile {
     /// Appends a row. The caller has checked that the cells match the columns.
     pub(super) fn row(&mut self, row: &[Cell]) -> Result<()> {
         self.rows.row(row)?;
-        if self.rows.count() == self.batch_rows { self.flush() } else { Ok(()) }
+        if self.rows.count == self.batch_rows { self.flush() } else { Ok(()) }
     }
 
     fn flush(&mut self) -> Result<()> {
@@ -67,7 +67,7 @@ impl ParquetFile {
 
     /// Completes the file under its hidden name.
     pub(super) fn finish(mut self) -> Result<AtomicFile> {
-        if self.rows.count() > 0 {
+        if self.rows.count > 0 {
             self.flush()?;
         }
         self.writer.into_inner().map_err(|e| failed(&self.path, e))

@@ -174,7 +174,7 @@ pub fn mine_inputs(
     done: impl Fn() -> Result<()> + Sync,
 ) -> Result<Collection> {
     options.validate()?;
-    let preset = inputs.preset().map(|preset| format!("{} (sha256 {})", preset.name, preset.sha256));
+    let preset = inputs.preset.as_ref().map(|preset| format!("{} (sha256 {})", preset.name, preset.sha256));
     let (files, problems) = inputs.files();
     let part = |loaded: Loaded| {
         let (data_sets, ScenarioFile { scenarios, problems, notes }) = mine_loaded(&loaded, options, implausible);

@@ -74,13 +74,10 @@ fn end_cause(at_end: Tags, matched: &Match, category: Category) -> &'static str 
     // Whether the lane change is in progress, and whether the target leads in the last item.
     let is_cut_in = category == Category::CutIn;
     let (changes, leads) = (if is_cut_in { at_end.changes_in } else { at_end.changes_out }, is_cut_in);
-    if matched.clamped {
-        "data_end"
-    } else if !changes {
-        "lc_end"
-    } else if at_end.leader != leads {
-        "leader"
-    } else {
-        "ego_lane"
+    match (changes, at_end.leader == leads) {
+        _ if matched.clamped => "data_end",
+        (false, _) => "lc_end",
+        (true, false) => "leader",
+        (true, true) => "ego_lane",
     }
 }

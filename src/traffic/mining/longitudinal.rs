@@ -89,15 +89,11 @@ fn detect(v: &[f64], window: usize, options: &LongitudinalOptions) -> Vec<Longit
             [(Accelerating, &rise), (Decelerating, &fall)].into_iter().filter(|(activity, _)| *activity != now);
         let begun =
             { others }.find_map(|(activity, series)| Some((activity, series.start(k, options.min_speed_change_mps)?)));
-        if let Some((activity, its_end)) = begun {
-            now = activity;
-            end = its_end;
-        } else if end == Some(k) {
-            now = Cruising;
-            end = None;
-        } else {
-            continue;
-        }
+        (now, end) = match begun {
+            Some(begun) => begun,
+            None if end == Some(k) => (Cruising, None),
+            None => continue,
+        };
         events.push(LongitudinalEvent { start: k, activity: now });
     }
     events

@@ -65,20 +65,7 @@ config_tables! {
         /// Which window decides that a lane change has ended. Default [`LaneChangeEnd::Observed`].
         pub lc_end: LaneChangeEnd = LaneChangeEnd::Observed,
     }
-}
 
-/// Position of the window in which steady lateral motion ends a lane change. It determines T.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum LaneChangeEnd {
-    /// The window begins at the sample (the published formula). The change ends up to 1 s early.
-    Published,
-    /// The window ends at the sample: closest to the true end of the motion.
-    #[default]
-    Observed,
-}
-
-config_tables! {
     /// The cut-in: what counts as found, and the filters of the paper.
     pub struct CutInOptions {
         /// Shorter ones are discarded, s. Default 0.1.
@@ -120,6 +107,17 @@ config_tables! {
         #[schemars(range(min = 0.0, max = 30.0))]
         pub min_peak_deceleration_mps2: f64 = 2.0,
     }
+}
+
+/// Position of the window in which steady lateral motion ends a lane change. It determines T.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LaneChangeEnd {
+    /// The window begins at the sample (the published formula). The change ends up to 1 s early.
+    Published,
+    /// The window ends at the sample: closest to the true end of the motion.
+    #[default]
+    Observed,
 }
 
 impl MiningOptions {

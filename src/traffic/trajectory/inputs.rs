@@ -14,10 +14,11 @@ use lanesweep_support::{Error, Place, Result, option};
 /// Recordings whose format is known: highD's, or that of a preset.
 #[derive(Debug, Default)]
 pub struct Inputs {
-    files: Vec<InputFile>,
+    pub(crate) files: Vec<InputFile>,
     /// What is wrong with recordings, or with other files that could be tracks.
     problems: Vec<Error>,
-    preset: Option<Preset>,
+    /// `None` for highD's format.
+    pub preset: Option<Preset>,
 }
 
 /// One file of recordings.
@@ -70,7 +71,7 @@ impl Inputs {
     /// Leaves out files of a folder that are no tracks. Names those that could be tracks: files of another preset, compressed
     /// files, and files that do not fit or cannot be opened although they have the ending of those that are read.
     fn with_others(mut self, folder: &Path) -> Result<Inputs> {
-        let own = self.preset().map(|preset| preset.name.clone());
+        let own = self.preset.as_ref().map(|preset| preset.name.clone());
         let mut endings: Vec<String> = own.is_none().then(|| "csv".to_owned()).into_iter().collect();
         let mut foreign = Vec::new();
         for file in files_of(folder)? {
@@ -83,7 +84,7 @@ impl Inputs {
             if is_highd && file.to_str().is_none() {
                 self.problems.push(Error::input(Place::file(&file), "its name is not UTF-8", "rename it"));
             }
-            let is_meta = self.preset().is_some_and(|preset| tracks::is_meta(&name, preset));
+            let is_meta = self.preset.as_ref().is_some_and(|preset| tracks::is_meta(&name, preset));
             if is_highd || is_meta || !tracks::may_hold_tracks(&file) {
                 continue;
             }
@@ -107,16 +108,6 @@ impl Inputs {
             }
         }
         Ok(self)
-    }
-
-    /// The preset; `None` for highD's format.
-    pub fn preset(&self) -> Option<&Preset> {
-        self.preset.as_ref()
-    }
-
-    /// Number of files of recordings.
-    pub(crate) fn count(&self) -> usize {
-        self.files.len()
     }
 
     /// The files, and what is wrong with others.
@@ -153,10 +144,8 @@ impl InputFile {
             {
                 let place = Place::file(self.paths()[0]).of(format!("recording {}", loaded.recording.id));
                 let format = if matches!(self, InputFile::Highd(_)) { HIGHD_HELP } else { "" };
-                let help = format!(
-                    "`lanesweep tracks` shows all; {} uses the tracks as they are{format}",
-                    option("accept_implausible")
-                );
+                let accept = option("accept_implausible");
+                let help = format!("`lanesweep tracks` shows all; {accept} uses the tracks as they are{format}");
                 return Err(Error::input(place, grave.text.clone(), help));
             }
             loaded.notes.extend(findings.into_iter().map(|finding| finding.text));

@@ -38,27 +38,7 @@ config_tables! {
         /// How scenarios arise.
         pub behaviour: Behaviour = Behaviour::default(),
     }
-}
 
-impl GeneratorOptions {
-    /// Checks every option; the error names the first one outside its range.
-    pub(crate) fn validate(&self) -> Result<()> {
-        ranges::check("generator", self)
-    }
-
-    /// Simulation steps per sample: the minimum with a step of at most 0.04 s.
-    pub(super) fn steps_per_sample(&self) -> usize {
-        // The small term keeps 25 Hz at one step although 0.04 is not exact in binary.
-        ((25.0 / self.frame_rate_hz - 1e-9).ceil() as usize).max(1)
-    }
-
-    /// Samples per recording.
-    pub(super) fn samples(&self) -> usize {
-        (self.duration_s * self.frame_rate_hz).round() as usize
-    }
-}
-
-config_tables! {
     /// How drivers change lanes and brake. Rates and fractions are those at rate factor 1.
     ///
     /// The defaults are fitted to the paper's 36 failure rates of S and to published traffic figures
@@ -105,5 +85,23 @@ config_tables! {
         /// deceleration.
         #[schemars(range(min = 0.0, max = 2.0))]
         pub overreaction: f64 = 0.226,
+    }
+}
+
+impl GeneratorOptions {
+    /// Checks every option; the error names the first one outside its range.
+    pub(crate) fn validate(&self) -> Result<()> {
+        ranges::check("generator", self)
+    }
+
+    /// Simulation steps per sample: the minimum with a step of at most 0.04 s.
+    pub(super) fn steps_per_sample(&self) -> usize {
+        // The small term keeps 25 Hz at one step although 0.04 is not exact in binary.
+        ((25.0 / self.frame_rate_hz - 1e-9).ceil() as usize).max(1)
+    }
+
+    /// Samples per recording.
+    pub(super) fn samples(&self) -> usize {
+        (self.duration_s * self.frame_rate_hz).round() as usize
     }
 }

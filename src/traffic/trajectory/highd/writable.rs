@@ -76,10 +76,8 @@ impl ImageLayout {
             let named = Direction::BOTH.into_iter().find(|direction| direction.name() == of.name);
             let item = format!(", carriageway `{}`", of.name);
             let Some(direction) = named.filter(follows) else {
-                return refuse(
-                    item,
-                    "unknown, repeated or out of order: names are `1` (upper lanes) and `2` (lower lanes)",
-                );
+                let problem = "unknown, repeated or out of order: names are `1` (upper lanes) and `2` (lower lanes)";
+                return refuse(item, problem);
             };
             let mut lines: Vec<f64> = of.lane_lines_m.iter().map(|&d| rounded(direction.leftward(d))).collect();
             if direction == Direction::Upper {
@@ -89,10 +87,8 @@ impl ImageLayout {
                 || !(2..=LANE_LINES_LIMIT).contains(&lines.len())
                 || lines.array_windows().any(|[above, below]| above >= below)
             {
-                return refuse(
-                    item,
-                    "its lane lines are not at least two that fall from left to right by 0.01 m and more",
-                );
+                let problem = "its lane lines are not at least two that fall from left to right by 0.01 m and more";
+                return refuse(item, problem);
             }
             lines_y[direction as usize] = lines;
             directions.push(direction);

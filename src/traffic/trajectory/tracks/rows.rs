@@ -31,7 +31,7 @@ impl Columns {
     /// Finds the columns in a header; absent ones are left out.
     pub(super) fn of(named: &BTreeMap<Role, ColumnName>, header: &[String], none: &[String]) -> Columns {
         let mut positions: HashMap<String, usize> = HashMap::new();
-        let wanted: HashSet<String> = named.values().flat_map(ColumnName::names).map(|name| letters(name)).collect();
+        let wanted: HashSet<String> = named.values().flat_map(|of| &of.names).map(|name| letters(name)).collect();
         let mut name = String::new();
         for (at, column) in header.iter().enumerate() {
             name.clear();
@@ -42,12 +42,12 @@ impl Columns {
         }
         let mut at = [None; Role::ALL.len()];
         for (role, column) in named {
-            let position = column.names().iter().find_map(|name| positions.get(&letters(name)));
+            let position = column.names.iter().find_map(|name| positions.get(&letters(name)));
             at[*role as usize] = position.copied().zip(column.factor(*role));
         }
-        let mut has_time_unit = named
-            .get(&Role::Time)
-            .is_some_and(|time| time.unit().is_some_and(|unit| unit != "date") || time.factor(Role::Time) != Some(1.0));
+        let mut has_time_unit = named.get(&Role::Time).is_some_and(|time| {
+            time.unit.as_deref().is_some_and(|unit| unit != "date") || time.factor(Role::Time) != Some(1.0)
+        });
         // INTERACTION's time has its unit in its name.
         let in_ms = header.iter().position(|column| letters(column) == "timestampms");
         if at[Role::Time as usize].is_none() && in_ms.is_some() && named.contains_key(&Role::Time) {
