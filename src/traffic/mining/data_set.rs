@@ -58,13 +58,11 @@ impl<'a> DataSet<'a> {
         let samples = recording_tags.options.ego_view.last_sample(ego)? + 1;
         let carriageway = &recording_tags.recording.carriageways[ego.carriageway];
         let mut set = DataSet { recording_tags, ego_index, ego, carriageway, samples, leader: Vec::new() };
-        let mut last = None;
-        set.leader = (0..samples)
-            .map(|k| {
-                last = set.leader_at(k, last);
-                last
-            })
-            .collect();
+        let leader = (0..samples).scan(None, |last, k| {
+            *last = set.leader_at(k, *last);
+            Some(*last)
+        });
+        set.leader = leader.collect();
         Some(set)
     }
 

@@ -315,17 +315,17 @@ impl Understanding {
                 "vehicles move {times} times as far across the road as their lateral speeds tell: check the unit of y and the width of lanes"
             ));
         }
-        if let Some((cosine, across)) = heading {
-            if cosine < 0.9 {
-                self.refuse(format!(
-                    "headings and motion differ (median cosine {}): check the unit of the heading, and `axes.heading` (from-x or from-north)",
-                    significant(cosine, 2)
-                ));
-            } else if across.slope() < -0.3 && across.correlation() < -0.3 && across.is_opposite() {
-                self.refuse(
-                    "headings turn against the motion across the road: y, or the heading, is mirrored; see `axes.y`",
-                );
+        match heading {
+            Some((cosine, _)) if cosine < 0.9 => {
+                let cosine = significant(cosine, 2);
+                self.refuse(format!("headings and motion differ (median cosine {cosine}): check the unit of the heading, and `axes.heading` (from-x or from-north)"));
             }
+            Some((_, across)) if across.slope() < -0.3 && across.correlation() < -0.3 && across.is_opposite() => {
+                let text =
+                    "headings turn against the motion across the road: y, or the heading, is mirrored; see `axes.y`";
+                self.refuse(text);
+            }
+            _ => (),
         }
         let is_left = preset.traffic == Side::Left;
         match self.seen.oncoming_left_m {
