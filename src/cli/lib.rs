@@ -27,7 +27,6 @@ mod source;
 mod study;
 mod tracks;
 mod verify;
-mod xosc;
 
 pub use exit::Exit;
 
