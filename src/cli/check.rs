@@ -14,7 +14,7 @@ use lanesweep_model::driver::ModelId;
 use lanesweep_model::plausibility::Doubts;
 use lanesweep_model::profile::Profile;
 use lanesweep_model::scenario::Scenario;
-use lanesweep_report::case_identity::CaseIdentity;
+use lanesweep_report::case_evidence::CaseIdentity;
 use lanesweep_report::case_sheet::CaseSheet;
 use lanesweep_run::check::{Check as Checked, Subject, retain_applicable};
 use lanesweep_support::files::{check_output, write_atomically};

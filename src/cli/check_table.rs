@@ -16,7 +16,7 @@ use lanesweep_model::driver::ModelId;
 use lanesweep_model::plausibility::Doubts;
 use lanesweep_model::profile::Profile;
 use lanesweep_model::scenario::COLUMNS_HELP;
-use lanesweep_report::case_identity::CaseIdentity;
+use lanesweep_report::case_evidence::CaseIdentity;
 use lanesweep_report::case_sheet::CaseSheet;
 use lanesweep_report::case_table::{CaseAnswer, CaseAnswers};
 use lanesweep_run::check::{self, Subject, nominal_verdicts};
@@ -76,7 +76,7 @@ impl CheckedTable<'_> {
         unchanged(self.path)?;
         cases.retain(|case: &CaseAnswer| {
             let before = broken.len();
-            broken.extend(case.id().and_then(|id| table.refused_later(id)));
+            broken.extend(case.id.as_deref().and_then(|id| table.refused_later(id)));
             broken.len() == before
         });
         doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));

@@ -1,17 +1,18 @@
-//! `lanesweep config`: the configuration file, its schema, its check, and the effective values.
+//! `lanesweep config`: the configuration file, its schema, its check, and the effective values; shell completions and manual
+//! pages from the command definition.
 
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand, ValueEnum};
+use clap_complete::Shell;
 use serde_json::json;
 
-use super::configured::Configured;
-use super::shell::{Completions, Man};
-use super::{Output, console};
+use super::configured::{Configured, command};
+use super::{Exit, Output, console};
 use crate::settings::{DEFAULT_FILE, DEFAULT_FILE_NAME, Layers, Setting, profile_schema, settings_schema, text_of};
 use lanesweep_model::profile::Profile;
 use lanesweep_report::records::document;
-use lanesweep_support::files::write_atomically;
+use lanesweep_support::files::{make_folder, write_atomically, write_inside};
 use lanesweep_support::plain_text::{nearest, quoted_word};
 use lanesweep_support::{Error, Place, Result};
 
@@ -65,8 +66,25 @@ enum ConfigVerb {
         #[arg(value_enum, default_value_t, help_heading = "Data")]
         of: SchemaOf,
     },
-    Completions(Completions),
-    Man(Man),
+    /// Print the completions for a shell
+    ///
+    /// Where a shell looks for them differs: bash reads files in ~/.local/share/bash-completion/completions, fish in
+    /// ~/.config/fish/completions, zsh in a folder of its $fpath (there the file is called _lanesweep).
+    #[command(after_help = "Example:\n  lanesweep config completions bash")]
+    Completions {
+        /// The shell
+        #[arg(value_name = "SHELL", help_heading = "Data")]
+        shell: Shell,
+    },
+    /// Write the manual pages into a folder
+    ///
+    /// One page for the program and one per verb: lanesweep.1, lanesweep-study.1, lanesweep-merge.1, …
+    #[command(after_help = "Example:\n  lanesweep config man man1")]
+    Man {
+        /// Folder of the pages
+        #[arg(value_name = "DIR", help_heading = "Data")]
+        dir: PathBuf,
+    },
 }
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
@@ -97,8 +115,8 @@ impl Config {
             ConfigVerb::Check { file } => check(file),
             ConfigVerb::Schema { of: SchemaOf::Config } => console::answer(&format!("{:#}\n", settings_schema())),
             ConfigVerb::Schema { of: SchemaOf::Profile } => console::answer(&format!("{:#}\n", profile_schema()?)),
-            ConfigVerb::Completions(verb) => verb.run(),
-            ConfigVerb::Man(verb) => verb.run(),
+            ConfigVerb::Completions { shell } => completions(*shell),
+            ConfigVerb::Man { dir } => man(dir),
         }
     }
 }
@@ -186,4 +204,39 @@ fn toml_file(shown: &[&Setting]) -> String {
         text += &format!("{name} = {}\n", text_of(value));
     }
     text
+}
+
+fn completions(shell: Shell) -> Result<Output> {
+    let mut text = Vec::new();
+    clap_complete::generate(shell, &mut command(), "lanesweep", &mut text);
+    let text = String::from_utf8(text).map_err(|e| Error::Internal(format!("completions are no text: {e}")))?;
+    console::answer(&text)
+}
+
+/// Collects a command and its visible subcommands, by the names of their pages.
+fn collect(name: String, command: &clap::Command, pages: &mut Vec<(String, clap::Command)>) {
+    pages.push((name.clone(), command.clone()));
+    for verb in command.get_subcommands().filter(|verb| !verb.is_hide_set() && verb.get_name() != "help") {
+        collect(format!("{name}-{}", verb.get_name()), verb, pages);
+    }
+}
+
+fn man(dir: &Path) -> Result<Output> {
+    make_folder(dir)?;
+    // A page has the values of every flag; help shows those of some as the value's name.
+    let with_values = |verb: clap::Command| verb.mut_args(|arg| arg.hide_possible_values(false));
+    let mut program = with_values(command()).mut_subcommands(|verb| with_values(verb).mut_subcommands(with_values));
+    // Adds global flags and versions to the verbs.
+    program.build();
+    let mut pages = Vec::new();
+    collect("lanesweep".to_owned(), &program, &mut pages);
+    let written = pages.len();
+    for (name, command) in pages {
+        let mut page = Vec::new();
+        let unwritten = |e: std::io::Error| Error::Internal(format!("a manual page cannot be made: {e}"));
+        clap_mangen::Man::new(command).render(&mut page).map_err(unwritten)?;
+        write_inside(&dir.join(format!("{name}.1")), |file| file.write_all(&page))?;
+    }
+    tracing::info!("{written} pages written to {}", dir.display());
+    Ok(Exit::Ok.into())
 }

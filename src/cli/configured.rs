@@ -110,14 +110,8 @@ fn flag(key: &Key, id: &str, value_name: &str) -> Arg {
                 .ignore_case(true)
         }
         KeyKind::Number(range) => {
-            let name = if range.is_whole {
-                "N"
-            } else if key.name.ends_with("_s") {
-                "s"
-            } else {
-                "FRACTION"
-            };
-            arg.value_name(name).allow_negative_numbers(true)
+            let unit = if key.name.ends_with("_s") { "s" } else { "FRACTION" };
+            arg.value_name(if range.is_whole { "N" } else { unit }).allow_negative_numbers(true)
         }
         KeyKind::Boolean | KeyKind::Text => arg.value_name(value_name.to_owned()),
     }
@@ -152,6 +146,17 @@ pub(super) fn load_profile(name: &str) -> Result<Profile> {
     Ok(profile)
 }
 
+/// The verb and its subverb, the values of `--config` before and after them, and the matches of the last one.
+fn verb_of(matches: &ArgMatches) -> (Vec<&str>, Vec<&str>, &ArgMatches) {
+    let (mut path, mut typed, mut last) = (Vec::new(), Vec::new(), matches);
+    loop {
+        typed.extend(last.get_many::<String>("config").into_iter().flatten().map(String::as_str));
+        let Some((name, inner)) = last.subcommand() else { return (path, typed, last) };
+        path.push(name);
+        last = inner;
+    }
+}
+
 impl Configured {
     /// Combines the layers, and parses the rest of the command line.
     ///
@@ -161,7 +166,8 @@ impl Configured {
         let unread = |e: clap::Error| Error::Internal(format!("the command line cannot be read: {e}"));
         let mut cli = Cli::from_arg_matches(matches).map_err(unread)?;
         let (path, typed, last) = verb_of(matches);
-        let mut layers = if reads_configuration(&path) { Layers::read(&typed)? } else { Layers::defaults() };
+        let reads_none = matches!(path[..], ["config", "init" | "schema" | "check" | "completions" | "man"]);
+        let mut layers = if reads_none { Layers::defaults() } else { Layers::read(&typed)? };
         let verb = path.last().unwrap_or(&"");
         let keys = Key::all();
         for (key, KeyFlag { name, .. }) in flags_of(&keys, "lanesweep").chain(flags_of(&keys, verb)) {
@@ -281,35 +287,15 @@ impl Configured {
     /// # Errors
     /// [`Error::Usage`].
     pub(super) fn refuse_lane_keys(&self, are_files_refused: bool, why: &str, help: &str) -> Result<()> {
-        let is_refused = |origin: &Origin| match origin {
-            Origin::Assignment(_) => true,
-            Origin::File { .. } => are_files_refused,
-            _ => false,
+        let is_refused = |origin: &Origin| {
+            matches!(origin, Origin::Assignment(_)) || are_files_refused && matches!(origin, Origin::File { .. })
         };
         let mut refused = self.layers.given().filter(|of| is_refused(&of.origin) && is_of_plan(&of.key.name));
         refused.next().map_or(Ok(()), |Setting { key, origin, .. }| {
             Err(Error::usage(origin.place(&key.name), format!("`{}` {why}", key.name), help))
         })
     }
-}
 
-/// Whether a verb reads the configuration.
-fn reads_configuration(path: &[&str]) -> bool {
-    !matches!(path, ["config", "init" | "schema" | "check" | "completions" | "man"])
-}
-
-/// The verb and its subverb, the values of `--config` before and after them, and the matches of the last one.
-fn verb_of(matches: &ArgMatches) -> (Vec<&str>, Vec<&str>, &ArgMatches) {
-    let (mut path, mut typed, mut last) = (Vec::new(), Vec::new(), matches);
-    loop {
-        typed.extend(last.get_many::<String>("config").into_iter().flatten().map(String::as_str));
-        let Some((name, inner)) = last.subcommand() else { return (path, typed, last) };
-        path.push(name);
-        last = inner;
-    }
-}
-
-impl Configured {
     /// The requested backend and device.
     ///
     /// # Errors

@@ -53,9 +53,9 @@ fn capture(level: Level, line: &str) -> bool {
 }
 
 /// Writes lines of the log to stderr, or to what is captured.
-struct LogLine(Level);
+struct Log(Level);
 
-impl Write for LogLine {
+impl Write for Log {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         if capture(self.0, &String::from_utf8_lossy(bytes)) { Ok(bytes.len()) } else { io::stderr().write(bytes) }
     }
@@ -65,17 +65,15 @@ impl Write for LogLine {
     }
 }
 
-struct Log;
-
 impl MakeWriter<'_> for Log {
-    type Writer = LogLine;
+    type Writer = Log;
 
-    fn make_writer(&self) -> LogLine {
-        LogLine(Level::INFO)
+    fn make_writer(&self) -> Log {
+        Log(self.0)
     }
 
-    fn make_writer_for(&self, meta: &Metadata<'_>) -> LogLine {
-        LogLine(*meta.level())
+    fn make_writer_for(&self, meta: &Metadata<'_>) -> Log {
+        Log(*meta.level())
     }
 }
 
@@ -83,7 +81,7 @@ impl MakeWriter<'_> for Log {
 pub(super) fn start_log(level: Level) {
     // A second start (a test in the same process) keeps the first log.
     let _ = tracing_subscriber::fmt()
-        .with_writer(Log)
+        .with_writer(Log(Level::INFO))
         // The owner of what is captured gets the level beside the line.
         .with_level(!is_captured())
         // If stderr is closed or full, no message can be shown, and writing one would panic.
@@ -191,19 +189,12 @@ fn log_at_intervals(bar: &WeakProgressBar) {
 
 /// `sweeping: 1,200 of 9,600 (12 %) in 2 minutes, about 15 minutes left`.
 fn line_of(bar: &ProgressBar) -> String {
-    let (done, all, elapsed) = (bar.position(), bar.length().unwrap_or_default(), bar.elapsed());
+    let (what, done, all, elapsed) = (bar.message(), bar.position(), bar.length().unwrap_or_default(), bar.elapsed());
     let parts = done as f64 / all.max(1) as f64;
     // At the mean speed so far.
     let left = if done > 0 { elapsed.mul_f64((1.0 / parts - 1.0).max(0.0)) } else { Duration::ZERO };
-    format!(
-        "{}: {} of {} ({:.0} %) in {:#}{}",
-        bar.message(),
-        count(done),
-        count(all),
-        100.0 * parts,
-        HumanDuration(elapsed),
-        remaining(elapsed, left)
-    )
+    let ([done, all], percent, left) = ([done, all].map(count), 100.0 * parts, remaining(elapsed, left));
+    format!("{what}: {done} of {all} ({percent:.0} %) in {:#}{left}", HumanDuration(elapsed))
 }
 
 /// Measured work before the remaining time is told: first units are slower, and few tell little.

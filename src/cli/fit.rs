@@ -10,8 +10,8 @@ use super::format::FormatFlag;
 use super::lists;
 use super::source::SourceFlags;
 use super::{Exit, Output};
-use lanesweep_model::scenario::DataProvenance;
 use lanesweep_model::scenario::parameterization::{Parameterization, ParameterizationOptions};
+use lanesweep_model::scenario::{DataProvenance, Driven};
 use lanesweep_report::density;
 use lanesweep_report::host::SettingRecord;
 use lanesweep_report::records;
@@ -40,8 +40,11 @@ pub(super) struct Fit {
     out: PathBuf,
     #[command(flatten)]
     categories: lists::CategoriesFlag,
-    #[command(flatten)]
-    parameterizations: lists::ParameterizationsFlag,
+    /// Parameterizations: 1…7, a…g, i…v [default: all]
+    ///
+    /// 1…7 are for cut-ins, a…g for cut-outs, i…v for leader decelerations.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Scenario")]
+    parameterizations: Vec<String>,
     /// Add the observed time headway as a parameter (thw_s)
     #[arg(long, help_heading = "Scenario")]
     with_thw: bool,
@@ -51,8 +54,12 @@ pub(super) struct Fit {
     /// not the recordings.
     #[arg(long, help_heading = "Models and criteria")]
     without_scenarios: bool,
-    #[command(flatten)]
-    exposure: lists::ExposureFlags,
+    /// Driven time of all egos [default: from the recordings]
+    #[arg(long, value_name = "h", help_heading = "Data")]
+    hours: Option<f64>,
+    /// Driven distance of all egos [default: from the recordings]
+    #[arg(long, value_name = "km", help_heading = "Data")]
+    km: Option<f64>,
     #[command(flatten)]
     format: FormatFlag,
 }
@@ -60,8 +67,9 @@ pub(super) struct Fit {
 impl Fit {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         let config = &configured.settings;
-        let ids = self.parameterizations.list(&self.categories.list()?)?;
-        let typed = self.exposure.driven()?;
+        let ids = lists::parameterizations(&self.parameterizations, &self.categories.list()?)?;
+        let typed = Driven { hours: self.hours, kilometres: self.km };
+        typed.validate()?;
         let options = FitOptions {
             parameterization: ParameterizationOptions {
                 svd_lateral: config.fit.svd_lateral,

@@ -4,6 +4,7 @@ use clap::{Args, ValueEnum};
 
 use super::{Exit, Output, console};
 use lanesweep_report::host::Host;
+use lanesweep_report::records::document;
 use lanesweep_report::sampling::SampleReport;
 use lanesweep_report::study::StudyReport;
 use lanesweep_run::sampling::{Sample, SampleResult};
@@ -83,10 +84,7 @@ impl FormatFlag {
     /// The answer about a plan that `--plan-only` wrote.
     pub(super) fn planned(self, exit: Exit, lanes: u64, path: &std::path::Path) -> Result<Output> {
         let text = || format!("{} runs planned in {}\n", count(lanes), path.display());
-        self.output(exit, text, || {
-            lanesweep_report::records::document(
-                &serde_json::json!({"lanes": lanes, "plan": path.display().to_string()}),
-            )
-        })
+        let record = serde_json::json!({"lanes": lanes, "plan": path.display().to_string()});
+        self.output(exit, text, || document(&record))
     }
 }

@@ -19,18 +19,14 @@ mod map;
 mod merge;
 mod mine;
 mod sample;
-mod sample_options;
 mod sample_run;
 pub mod settings;
-mod shard_flags;
-mod shell;
 pub mod signals;
 mod simulate;
 mod source;
 mod study;
 mod tracks;
 mod verify;
-mod xosc;
 
 pub use exit::Exit;
 

@@ -1,17 +1,20 @@
-//! Flags used by several verbs, each with one definition: lists of categories, models, headways and parameterizations,
-//! the criterion, the exposure. A plural flag takes a list; without it all values are used.
+//! Lists of categories, models, headways and parameterizations, as flags give them. A plural flag takes a list; without it all
+//! values are used. Also the flags of verbs that can be split and resumed.
+
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
 use lanesweep_engine::Headway;
-use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::plausibility::Quantity;
 use lanesweep_model::scenario::Category;
-use lanesweep_model::scenario::Driven;
 use lanesweep_model::scenario::parameterization::Parameterization;
+use lanesweep_run::parts::Shard;
+use lanesweep_support::files::check_folder;
 use lanesweep_support::plain_text::nearest;
 use lanesweep_support::ranges::refuse_repeats;
+use lanesweep_support::run_folder::RunFolder;
 use lanesweep_support::{Error, Place, Result, option};
 
 /// `--categories`.
@@ -39,40 +42,28 @@ impl CategoriesFlag {
     }
 }
 
-/// `--parameterizations`.
-#[derive(Debug, Clone, Args)]
-pub(super) struct ParameterizationsFlag {
-    /// Parameterizations: 1…7, a…g, i…v [default: all]
-    ///
-    /// 1…7 are for cut-ins, a…g for cut-outs, i…v for leader decelerations.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Scenario")]
-    parameterizations: Vec<String>,
-}
-
-impl ParameterizationsFlag {
-    /// The parameterizations of the categories, in the registry's order; all if the list is empty.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] for an unknown or repeated parameterization.
-    pub(super) fn list(&self, categories: &[Category]) -> Result<Vec<Parameterization>> {
-        let of_categories = || Parameterization::ALL.into_iter().filter(|p| categories.contains(&p.category));
-        let wanted: Vec<&str> = self.parameterizations.iter().map(|key| key.trim()).collect();
-        refuse_repeats(|| Place::option("parameterizations"), wanted.iter().map(|key| (*key, *key)))?;
-        if wanted.is_empty() || wanted.contains(&"all") {
-            return Ok(of_categories().collect());
-        }
-        if let Some(unknown) = wanted.iter().find(|key| of_categories().all(|p| p.key != **key)) {
-            let of = |c: &Category| {
-                let keys: Vec<_> = Parameterization::of(*c).map(|p| p.key).collect();
-                format!("{}: {}", c.label(), keys.join(" "))
-            };
-            let names: Vec<&str> = categories.iter().map(|c| c.label()).collect();
-            let problem = format!("there is no parameterization `{unknown}` of {}", names.join(", "));
-            let help = format!("use {}, or all", Category::ALL.iter().map(of).collect::<Vec<_>>().join("; "));
-            return Err(Error::usage(Place::option("parameterizations"), problem, help));
-        }
-        Ok(of_categories().filter(|p| wanted.contains(&p.key)).collect())
+/// The parameterizations of the categories, in the registry's order; all if the list is empty.
+///
+/// # Errors
+/// [`Error::Usage`] for an unknown or repeated parameterization.
+pub(super) fn parameterizations(list: &[String], categories: &[Category]) -> Result<Vec<Parameterization>> {
+    let of_categories = || Parameterization::ALL.into_iter().filter(|p| categories.contains(&p.category));
+    let wanted: Vec<&str> = list.iter().map(|key| key.trim()).collect();
+    refuse_repeats(|| Place::option("parameterizations"), wanted.iter().map(|key| (*key, *key)))?;
+    if wanted.is_empty() || wanted.contains(&"all") {
+        return Ok(of_categories().collect());
     }
+    if let Some(unknown) = wanted.iter().find(|key| of_categories().all(|p| p.key != **key)) {
+        let of = |c: &Category| {
+            let keys: Vec<_> = Parameterization::of(*c).map(|p| p.key).collect();
+            format!("{}: {}", c.label(), keys.join(" "))
+        };
+        let names: Vec<&str> = categories.iter().map(|c| c.label()).collect();
+        let problem = format!("there is no parameterization `{unknown}` of {}", names.join(", "));
+        let help = format!("use {}, or all", Category::ALL.iter().map(of).collect::<Vec<_>>().join("; "));
+        return Err(Error::usage(Place::option("parameterizations"), problem, help));
+    }
+    Ok(of_categories().filter(|p| wanted.contains(&p.key)).collect())
 }
 
 /// `--models`.
@@ -102,77 +93,9 @@ impl ModelsFlag {
     }
 }
 
-/// `--thw` of a verb that replays scenarios.
-#[derive(Debug, Clone, Args)]
-pub(super) struct HeadwaysFlag {
-    /// Time headways, s: numbers, paper, r157, observed
-    ///
-    /// paper: 2.0, 1.8, … 0.2. The paper's claims need all of its headways. r157: the minimum following distance of UN R157, 5.2.3.3, for the
-    /// ego's speed; a list may contain it. observed: each scenario starts from its recorded gap, and a density draws
-    /// the headway as one more parameter; it cannot be combined with other headways.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "paper", help_heading = "Scenario")]
-    #[arg(allow_negative_numbers = true)]
-    thw: Vec<String>,
-}
-
-impl HeadwaysFlag {
-    /// The headways in the given order.
-    ///
-    /// # Errors
-    /// As [`headways`].
-    pub(super) fn list(&self) -> Result<Vec<Headway>> {
-        match &self.thw[..] {
-            [one] if Headway::parse(one.trim()) == Some(Headway::Observed) => Ok(vec![Headway::Observed]),
-            list => headways(list),
-        }
-    }
-}
-
 /// Help of `--models`.
 pub(super) fn models_help() -> String {
     format!("Driver models: {} [default: all]", ModelId::names())
-}
-
-/// `--criterion`.
-#[derive(Debug, Clone, Args)]
-pub(super) struct CriterionFlag {
-    /// Criterion to evaluate
-    #[arg(long, value_name = "collision|ttc|btn", default_value = "collision", help_heading = "Models and criteria")]
-    criterion: String,
-}
-
-impl CriterionFlag {
-    /// The criterion.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] for an unknown criterion.
-    pub(super) fn get(&self) -> Result<Criterion> {
-        let (text, names) = (self.criterion.trim(), Criterion::ALL.map(Criterion::key));
-        Criterion::parse(text).ok_or_else(|| Error::unknown(Place::option("criterion"), "criterion", text, names, ""))
-    }
-}
-
-/// `--hours` and `--km`.
-#[derive(Debug, Clone, Args)]
-pub(super) struct ExposureFlags {
-    /// Driven time of all egos [default: from the recordings]
-    #[arg(long, value_name = "h", help_heading = "Data")]
-    hours: Option<f64>,
-    /// Driven distance of all egos [default: from the recordings]
-    #[arg(long, value_name = "km", help_heading = "Data")]
-    km: Option<f64>,
-}
-
-impl ExposureFlags {
-    /// The given exposure, checked.
-    ///
-    /// # Errors
-    /// As [`Driven::validate`].
-    pub(super) fn driven(&self) -> Result<Driven> {
-        let driven = Driven { hours: self.hours, kilometres: self.km };
-        driven.validate()?;
-        Ok(driven)
-    }
 }
 
 /// Parses model names, in the given order; `all` or an empty list means every model. `option` is the place in errors.
@@ -232,4 +155,32 @@ pub(super) fn headways(list: &[String]) -> Result<Vec<Headway>> {
     let meanings = found.iter().map(|headway| headway.identity());
     refuse_repeats(|| Place::option("thw"), meanings.zip(list.iter().map(|text| text.trim())))?;
     Ok(found)
+}
+
+/// Flags of every verb that can be split.
+#[derive(Debug, Clone, Args)]
+pub(super) struct ShardFlags {
+    /// Compute shard I of N (from 0); `merge` merges them
+    ///
+    /// The part is written to --out. `auto/N` takes I from a Kubernetes Indexed Job or a Slurm array.
+    #[arg(long, value_name = "I/N", help_heading = "Run")]
+    pub shard: Option<Shard>,
+    /// Run a plan that --plan-only wrote
+    #[arg(long, value_name = "FILE", conflicts_with = "plan_only", help_heading = "Run")]
+    pub plan: Option<PathBuf>,
+    /// Write the plan, plan.json in --out, and stop
+    #[arg(long, conflicts_with = "shard", help_heading = "Run")]
+    pub plan_only: bool,
+}
+
+impl ShardFlags {
+    /// Whether this is not a run in one piece.
+    pub(super) fn is_split(&self) -> bool {
+        self.plan_only || self.shard.is_some()
+    }
+
+    /// Checks the folder before the work: parts share it, a run in one piece has it alone.
+    pub(super) fn check_folder(&self, out: &Path, record: &'static str) -> Result<()> {
+        if self.is_split() { check_folder(out) } else { RunFolder::open(out, record).map(drop) }
+    }
 }

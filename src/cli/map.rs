@@ -10,6 +10,7 @@ use super::format::FormatFlag;
 use super::settings::MapSettings;
 use super::source::PlausibilityFlag;
 use super::{COMMIT, Exit, Output, lists};
+use lanesweep_model::criterion::Criterion;
 use lanesweep_model::plausibility::Doubts;
 use lanesweep_model::profile::Profile;
 use lanesweep_model::scenario::Category;
@@ -53,8 +54,9 @@ pub(super) struct Map {
     set: Vec<String>,
     #[command(flatten)]
     models: lists::ModelsFlag,
-    #[command(flatten)]
-    criterion: lists::CriterionFlag,
+    /// Criterion to evaluate
+    #[arg(long, value_name = "collision|ttc|btn", default_value = "collision", help_heading = "Models and criteria")]
+    criterion: String,
     /// Mark cells whose outcome changes with a tenth of the time step, 1 cm or 0.1 km/h
     ///
     /// They are undecided. Each cell is simulated eight times; sheets show undecided cells in their own colour.
@@ -91,7 +93,9 @@ fn after_long_help() -> String {
 impl Map {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         let category = Category::named(&self.category, Place::item("CATEGORY"))?;
-        let criterion = self.criterion.get()?;
+        let (name, names) = (self.criterion.trim(), Criterion::ALL.map(Criterion::key));
+        let unknown = || Error::unknown(Place::option("criterion"), "criterion", name, names, "");
+        let criterion = Criterion::parse(name).ok_or_else(unknown)?;
         let profile = self.profile(configured)?;
         let options = MapOptions {
             grids: self.grids(category, &configured.settings.map, &profile)?,

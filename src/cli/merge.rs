@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::configured::Configured;
 use super::format::FormatFlag;
-use super::sample_options::guard;
+use super::sample::guard;
 use super::sample_run::list_failures;
 use super::{COMMIT, Output};
 use lanesweep_report::host::{Host, Timings};

@@ -3,8 +3,7 @@
 use std::path::PathBuf;
 
 use super::configured::Configured;
-use super::sample::Sample;
-use super::sample_options::{guard, only_crude};
+use super::sample::{Sample, guard, only_crude};
 use super::signals::CANCEL;
 use super::{COMMIT, Exit, Output};
 use lanesweep_engine::{Chunk, CpuBackend, Executor, LanePlan, OpenBackend};

@@ -1,21 +1,28 @@
-//! `lanesweep simulate`: runs one concrete case step by step, for checking by hand.
+//! `lanesweep simulate`: runs one concrete case step by step, for checking by hand, and writes lanes as OpenSCENARIO files for
+//! other simulators.
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::case_flags::{GivenCase, from_table, from_toml, time_s};
 use super::configured::Configured;
 use super::console;
 use super::format::FormatFlag;
 use super::source::{PlausibilityFlag, check_ending, scenarios_of};
-use super::xosc::{self, XoscFlags};
 use super::{Exit, Output};
-use lanesweep_report::openscenario::{Concrete, PlayOptions, concrete_case};
+use lanesweep_engine::LaneKey;
+use lanesweep_model::scenario::{Scenario, Side};
+use lanesweep_report::openscenario::{
+    Concrete, EgoMotion, INDEX, PlayOptions, concrete_case, concrete_lanes, export_folder,
+};
 use lanesweep_report::trace::TraceReport;
 use lanesweep_run::reopen::{Reopened, TracedLanes};
+use lanesweep_support::atomic_file::folder_of;
 use lanesweep_support::files::{file_name, write_atomically};
-use lanesweep_support::run_folder::is_listed;
+use lanesweep_support::readable::counted;
+use lanesweep_support::run_folder::{RunFolder, is_listed};
 use lanesweep_support::{Error, Place, Result, option};
 
 /// Run one concrete scenario and print or draw its time series
@@ -70,25 +77,50 @@ pub(super) struct Simulate {
     /// End of the figure's time axis [default: 2 s after the last decisive event]
     #[arg(long, value_name = "s", requires = "plot", value_parser = time_s, help_heading = "Output")]
     plot_end: Option<f64>,
-    #[command(flatten)]
-    xosc: XoscFlags,
+    /// Also write ASAM OpenSCENARIO XML 1.2 with OpenDRIVE roads
+    ///
+    /// Every lane becomes NNN-KEY.xosc and NNN-KEY.xodr in this folder; index.csv lists them with their outcomes. The
+    /// other vehicles follow their own motion, step by step.
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    xosc: Option<PathBuf>,
+    /// Driver of the ego in --xosc
+    ///
+    /// model: the ego follows the path that the driver model drove. external: your own controller drives the ego; only its
+    /// position and speed at the start are written.
+    #[arg(long, value_parser = ego_motion(), default_value = "model", requires = "xosc", help_heading = "Output")]
+    ego: EgoMotion,
+    /// End of the scenario with --ego external [default: 10 s after the lane's last event and end]
+    #[arg(long, value_name = "s", requires = "xosc", value_parser = time_s, help_heading = "Output")]
+    duration: Option<f64>,
+    /// Side in --xosc that the other vehicle comes from or leaves to [default: the scenario's, else left]
+    #[arg(long, value_parser = side(), requires = "xosc", help_heading = "Output")]
+    side: Option<Side>,
     #[command(flatten)]
     plausibility: PlausibilityFlag,
     #[command(flatten)]
     format: FormatFlag,
 }
 
+fn ego_motion() -> impl TypedValueParser<Value = EgoMotion> {
+    let of = |word: String| if word == "external" { EgoMotion::External } else { EgoMotion::Model };
+    PossibleValuesParser::new(["model", "external"]).map(of)
+}
+
+fn side() -> impl TypedValueParser<Value = Side> {
+    PossibleValuesParser::new(["left", "right"]).map(|word| if word == "right" { Side::Right } else { Side::Left })
+}
+
 impl Simulate {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         self.guard_plot()?;
-        let options = self.xosc.options(self.case.lane_width_m())?;
+        let options = self.xosc_options()?;
         let (lanes, played, incomplete) = self.lanes(configured, options.as_ref())?;
         let report = TraceReport(&lanes);
         if let Some(path) = &self.plot {
             // Write the figure before the table: a closed stdout must not prevent it.
             write_atomically(path, report.figure(self.plot_end).svg().as_bytes())?;
         }
-        self.xosc.write(&played)?;
+        self.write_xosc(&played)?;
         let exit = if incomplete { Exit::Incomplete } else { Exit::Ok };
         let output = self.format.output(exit, || report.csv(), || report.json())?;
         if configured.level != tracing::Level::ERROR {
@@ -144,7 +176,7 @@ impl Simulate {
             }
         };
         let keys = reopened.named(&self.lane, self.case.named_models()?.as_deref(), &self.compare)?;
-        let played = options.map(|options| xosc::played(&reopened, &keys, &mined, options)).transpose()?;
+        let played = options.map(|options| played(&reopened, &keys, &mined, options)).transpose()?;
         Ok((reopened.traced(&keys)?, played.unwrap_or_default(), incomplete))
     }
 
@@ -166,6 +198,34 @@ impl Simulate {
         Ok(given)
     }
 
+    /// The options of the files, if they are asked for; checks their folder.
+    fn xosc_options(&self) -> Result<Option<PlayOptions>> {
+        let (Some(dir), lane_width_m) = (&self.xosc, self.case.lane_width_m()) else { return Ok(None) };
+        let refused = |flag, problem: String, help: &str| Err(Error::usage(Place::option(flag), problem, help));
+        if self.duration.is_some() && self.ego == EgoMotion::Model {
+            let problem = "the ego follows the driver model, and its path ends with the lane".to_owned();
+            return refused("duration", problem, &format!("add {}, or leave it out", option("ego = external")));
+        }
+        if let Some(duration) = self.duration.filter(|d| !(*d > 0.0 && *d <= 3600.0)) {
+            let problem = format!("{duration} s is out of range");
+            return refused("duration", problem, "give seconds above 0 and at most 3600");
+        }
+        if let Some(width) = lane_width_m.filter(|w| !(1.0..=20.0).contains(w)) {
+            let problem = format!("{width} m is not a lane width");
+            return refused("lane_width", problem, "give 1 to 20 m, such as 3.5");
+        }
+        drop(RunFolder::open(dir, INDEX)?);
+        Ok(Some(PlayOptions { ego: self.ego, duration_s: self.duration, side: self.side, lane_width_m }))
+    }
+
+    /// Writes the files, if they are asked for.
+    fn write_xosc(&self, played: &[Concrete]) -> Result<()> {
+        let Some(dir) = &self.xosc else { return Ok(()) };
+        export_folder(dir, played)?;
+        tracing::info!("{} written to {}; index.csv lists them", counted(played.len(), "scenario"), dir.display());
+        Ok(())
+    }
+
     /// Checks that the figure is an SVG file and replaces no result.
     fn guard_plot(&self) -> Result<()> {
         let Some(plot) = &self.plot else { return Ok(()) };
@@ -173,14 +233,24 @@ impl Simulate {
             let problem = format!("{until} s is out of range for a time axis");
             return Err(Error::usage(Place::option("plot_end"), problem, "give seconds above 0 and below 10^9"));
         }
-        let is_of_run = |dir: &Path| {
-            plot.parent().map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p }) == Some(dir)
-                && plot.file_name().and_then(|name| name.to_str()).is_some_and(|name| is_listed(dir, name))
-        };
+        let is_of_run = |dir: &Path| folder_of(plot) == dir && is_listed(dir, &file_name(plot));
         if self.from.as_deref().is_some_and(is_of_run) {
             let problem = format!("{} is a result of the run", plot.display());
             return Err(Error::usage(Place::option("plot"), problem, "choose another name"));
         }
         check_ending(plot, "svg", "plot")
     }
+}
+
+/// The scenarios of lanes; `mined` have sizes, side and lane width.
+fn played(reopened: &Reopened, keys: &[LaneKey], mined: &[Scenario], options: &PlayOptions) -> Result<Vec<Concrete>> {
+    let (scenarios, are_lengths_known) = concrete_lanes(reopened, keys, mined, options)?;
+    if !are_lengths_known {
+        tracing::warn!(
+            "a study's plan has only the sum of two lengths: the ego gets the profile's length, the others the \
+             remainder; gaps and contacts do not change ({} has the lengths)",
+            option("scenarios = FILE")
+        );
+    }
+    Ok(scenarios)
 }

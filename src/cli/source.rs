@@ -131,23 +131,19 @@ impl SourceFlags {
         let collection = self.load(configured)?;
         let mut provenance = source.provenance(&collection)?;
         let recorded = provenance.driven.unwrap_or(given);
-        for (flag, pair) in
-            [("hours", given.hours.zip(recorded.hours)), ("km", given.kilometres.zip(recorded.kilometres))]
-        {
-            if let Some((given, recorded)) =
-                pair.filter(|(given, recorded)| !(0.99..=1.01).contains(&(given / recorded)))
-            {
-                let recorded = lanesweep_support::readable::value(recorded);
-                let given = option(&format!("{flag} = {given}"));
-                tracing::warn!("{given} is used, but the recordings of these scenarios have {recorded}");
-            }
+        let pairs = [("hours", given.hours.zip(recorded.hours)), ("km", given.kilometres.zip(recorded.kilometres))];
+        let is_other = |(given, recorded): &(f64, f64)| !(0.99..=1.01).contains(&(given / recorded));
+        for (flag, pair) in pairs {
+            let Some((given, recorded)) = pair.filter(is_other) else { continue };
+            let recorded = lanesweep_support::readable::value(recorded);
+            let given = option(&format!("{flag} = {given}"));
+            tracing::warn!("{given} is used, but the recordings of these scenarios have {recorded}");
         }
         provenance.driven = given.known().or(provenance.driven);
         let Some(driven) = provenance.driven else {
+            let [hours, km] = ["hours", "km"].map(option);
             tracing::warn!(
-                "exposure is unknown, because the scenarios have no driven time and distance; give {} and {}",
-                option("hours"),
-                option("km")
+                "exposure is unknown, because the scenarios have no driven time and distance; give {hours} and {km}"
             );
             return Ok((collection, provenance));
         };

@@ -9,7 +9,6 @@ use super::configured::Configured;
 use super::console;
 use super::format::FormatFlag;
 use super::settings::KeepPlan;
-use super::shard_flags::ShardFlags;
 use super::source::{SourceFlags, check_lane_table};
 use super::{COMMIT, Exit, Output, lists};
 use lanesweep_engine::{Chunk, Headway, LanePlan, OpenBackend};
@@ -67,8 +66,14 @@ pub(super) struct Study {
     categories: lists::CategoriesFlag,
     #[command(flatten)]
     models: lists::ModelsFlag,
-    #[command(flatten)]
-    headways: lists::HeadwaysFlag,
+    /// Time headways, s: numbers, paper, r157, observed
+    ///
+    /// paper: 2.0, 1.8, … 0.2. The paper's claims need all of its headways. r157: the minimum following distance of UN R157, 5.2.3.3, for the
+    /// ego's speed; a list may contain it. observed: each scenario starts from its recorded gap, and a density draws
+    /// the headway as one more parameter; it cannot be combined with other headways.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "paper", help_heading = "Scenario")]
+    #[arg(allow_negative_numbers = true)]
+    thw: Vec<String>,
     /// S' of another program, a scenario file
     ///
     /// It has the ids of S; its series may have any sample rate and length. Repeatable.
@@ -77,7 +82,7 @@ pub(super) struct Study {
     #[command(flatten)]
     format: FormatFlag,
     #[command(flatten)]
-    shards: ShardFlags,
+    shards: lists::ShardFlags,
 }
 
 impl Study {
@@ -113,7 +118,10 @@ impl Study {
         let mut options = StudyOptions {
             categories: self.categories.list()?,
             models: self.models.list()?,
-            headways: self.headways.list()?,
+            headways: match &self.thw[..] {
+                [one] if Headway::parse(one.trim()) == Some(Headway::Observed) => vec![Headway::Observed],
+                list => lists::headways(list)?,
+            },
             parameterization: config.parameterization.clone(),
             folds: Some(config.study.folds).filter(|folds| *folds > 1),
             external: Vec::new(),

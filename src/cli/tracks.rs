@@ -20,7 +20,7 @@ use lanesweep_traffic::Source;
 use lanesweep_traffic::mining::{counts, mine_loaded};
 use lanesweep_traffic::trajectory::generator::generate_one;
 use lanesweep_traffic::trajectory::highd::{self, SYNTHETIC_MARKER};
-use lanesweep_traffic::trajectory::tracks::{LoadedTracks, SYNTHETIC};
+use lanesweep_traffic::trajectory::tracks::SYNTHETIC;
 use lanesweep_traffic::trajectory::{InputFile, Inputs, Loaded, NO_LANE, Recording, Track, VehicleClass};
 
 /// What is in a track file? Check it, draw it, convert it
@@ -148,10 +148,10 @@ impl Tracks {
             InputFile::Tracks(file, preset) => (&file.path, preset.name.as_str()),
         };
         let read = file.understand(Implausible::Accepted)?;
-        let report = |LoadedTracks { loaded, mut understanding }| {
+        let report = |loaded: Loaded| {
             // As in runs: what is noted of the scenarios, and those that are left out.
             let (_, mined) = mine_loaded(&loaded, &configured.settings.mining, Implausible::Refused);
-            let Loaded { recording, vehicle_names, .. } = loaded;
+            let Loaded { recording, vehicle_names, mut understanding, .. } = loaded;
             if understanding.is_usable() {
                 mined.notes.into_iter().for_each(|note| understanding.warn(note));
                 if let Some(first) = mined.problems.first() {

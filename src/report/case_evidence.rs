@@ -1,23 +1,28 @@
-//! What a case sheet rests on: identity with hashes, assumptions, and the effect of the time step.
+//! What a case sheet rests on: identity with hashes, assumptions, the effect of the time step, and what no sheet considers.
+//! Nothing is taken from the clock or the machine.
 
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use super::case_identity::{CaseIdentity, profile_sha256, program};
 use super::case_sheet::{CaseSheet, signed};
 use super::html::Section;
 use super::lanes::outcome_record;
-use super::records::{self, record};
-use super::tables::{WIDTH, wrap};
+use super::records::{self, PROGRAM, record};
+use super::tables::{WIDTH, indented, wrap};
 use lanesweep_engine::version::Canonical;
 use lanesweep_engine::{ENGINE_VERSION, Outcome};
 use lanesweep_model::assumptions::Assumption;
 use lanesweep_model::profile::Profile;
-use lanesweep_run::check::{Judged, Judgement, Subject};
+use lanesweep_run::check::{DriverRule, Judged, Judgement, RuleVerdicts, Subject};
 use lanesweep_run::grid::{PARAMETERS, Perturbation};
 use lanesweep_support::Result;
 use lanesweep_support::readable::value;
 use lanesweep_support::table::{Column, NumberText, Table};
+
+/// What the columns of the rules show.
+const RULES: &str = "The verdict if this driver alone decides; if any of the reference drivers suffices (in force); if all of them \
+     have to avoid the collision. A row per profile with reference drivers, as it is and with each other reading where Annex 3 \
+     is silent. *: differs from the answer of the sheet. Each verdict is robust or undecided as on the sheet";
 
 impl CaseSheet<'_> {
     /// The numbers of the case by key, in SI units.
@@ -58,15 +63,12 @@ impl CaseSheet<'_> {
             Some(format!("program: {}", program(self.identity.commit, 12))),
             self.identity.file_sha256.as_ref().map(|sha256| format!("file: {}", short(Ok(sha256.clone())))),
             Some(format!("case: {}", self.mark())),
-            Some(
-                wrap(&format!("profiles: {}", profiles.collect::<Vec<_>>().join(", ")), WIDTH - 2)
-                    .replace('\n', "\n  "),
-            ),
+            Some(format!("profiles: {}", profiles.collect::<Vec<_>>().join(", "))),
             self.identity.date.as_ref().map(|date| format!("date: {date}")),
             self.identity.author.as_ref().map(|author| format!("author: {author}")),
         ];
-        let parts: Vec<String> = parts.into_iter().flatten().map(|part| format!("  {part}\n")).collect();
-        format!("Identity, with the first 12 digits of each SHA-256\n{}", parts.concat())
+        let parts: String = parts.into_iter().flatten().map(|part| indented(&part)).collect();
+        format!("Identity, with the first 12 digits of each SHA-256\n{parts}")
     }
 
     /// The sheet's identity for programs.
@@ -167,6 +169,75 @@ impl CaseSheet<'_> {
             models: models.collect::<Vec<_>>(),
         })
     }
+
+    /// The rows of every profile.
+    fn rules(&self) -> impl Iterator<Item = (&str, &RuleVerdicts)> {
+        self.judgements.iter().flat_map(|of| of.by_rule.iter().map(move |rules| (of.profile.as_str(), rules)))
+    }
+
+    /// What each reference driver alone says, and the rule that is in force with its source.
+    pub(super) fn rule(&self) -> Vec<String> {
+        let Some(RuleVerdicts { verdicts, .. }) = self.first().by_rule.first() else { return Vec::new() };
+        let alone = verdicts.iter().filter_map(|(rule, verdict)| match rule {
+            DriverRule::Alone(model) => Some(format!("{}: {}", model.name(), verdict.label())),
+            DriverRule::Any | DriverRule::All => None,
+        });
+        let alone = alone.collect::<Vec<_>>().join("; ");
+        vec![format!(
+            "If one driver alone decides: {alone}. In force: a collision is preventable where any reference driver avoids it. {}",
+            DriverRule::SOURCE
+        )]
+    }
+
+    /// A row per profile and reading, a column per rule.
+    fn by_rule(&self) -> Table {
+        let mut rules: Vec<DriverRule> = Vec::new();
+        for (_, row) in self.rules() {
+            rules.extend(
+                row.verdicts.iter().map(|(rule, _)| rule).filter(|rule| !rules.contains(rule)).collect::<Vec<_>>(),
+            );
+        }
+        // The drivers first; a profile may have others than the first one.
+        rules.sort_by_key(|rule| !matches!(rule, DriverRule::Alone(_)));
+        let in_force = self.first().verdict();
+        let verdict = |row: &RuleVerdicts, rule: &DriverRule| {
+            let (_, verdict) = row.verdicts.iter().find(|(of, _)| of == rule)?;
+            Some(format!("{}{}", verdict.label(), if *verdict == in_force { "" } else { "*" }))
+        };
+        Table::of(self.rules().collect::<Vec<_>>())
+            .column("profile", |(profile, _)| profile)
+            .column("reading", |(_, row)| row.reading.unwrap_or("as it is"))
+            .columns(&rules, |rule| rule.label(), |(_, row), rule| verdict(row, rule))
+            .build()
+    }
+
+    /// The same as text; empty without reference drivers.
+    pub(super) fn by_rule_text(&self) -> String {
+        if self.rules().next().is_none() {
+            return String::new();
+        }
+        format!("{}\n{}", wrap(&format!("\nWhich driver decides. {RULES}"), WIDTH), self.by_rule().text())
+    }
+
+    /// The same as a chapter.
+    pub(super) fn by_rule_section(&self) -> Option<Section> {
+        self.rules().next()?;
+        let intro = self.rule().into_iter().map(|sentence| format!("{sentence}. ")).collect::<String>();
+        let table = self.by_rule().captioned("Verdict by rule, reading and profile");
+        Some(Section::new("rule", "Which driver decides").intro(format!("{intro}{RULES}.")).tables([table]))
+    }
+
+    /// The same with a row per profile, reading and rule.
+    pub(super) fn rule_rows(&self) -> Table {
+        let in_force = self.first().verdict();
+        Table::of(self.rules().flat_map(|(profile, row)| row.verdicts.iter().map(move |of| (profile, row.reading, of))))
+            .column("profile", |(profile, ..)| profile)
+            .column("reading", |(_, reading, _)| reading)
+            .column("rule", |(.., (rule, _))| rule.label())
+            .column("verdict", |(.., (_, verdict))| verdict.label())
+            .column("differs", |(.., (_, verdict))| *verdict != in_force)
+            .build()
+    }
 }
 
 fn profile_fact(profile: &Profile) -> (String, String) {
@@ -212,4 +283,80 @@ fn plain(of: &Value) -> String {
         Value::Array(list) => list.iter().map(plain).collect::<Vec<_>>().join(", "),
         other => other.to_string(),
     }
+}
+
+/// What no simulation of the program considers. The chapter for assessors has the same list.
+pub(super) const NOT_CONSIDERED: [(&str, &str); 9] = [
+    ("The system under assessment", "only reference drivers are simulated; nothing is said of what the system does"),
+    (
+        "Steering",
+        "no vehicle evades; the ego stays in the middle of its lane, the others keep to the motion of the case",
+    ),
+    ("Road", "straight and level, with lanes of one width; no curve, slope, bank or missing marking"),
+    ("Surface and weather", "every deceleration of the profile is reached: no wet, icy or uneven surface, no wind"),
+    (
+        "Perception",
+        "positions and speeds are known without error, loss or occlusion, in every light and weather; delays are those of the profile",
+    ),
+    (
+        "Vehicle dynamics",
+        "braking is a deceleration, with a limited jerk where the model has one: no tyres, load, trailer, brake temperature or \
+         control system",
+    ),
+    ("0.85 g after full overlap (Annex 3, table 1)", "the profile's maximum deceleration applies throughout"),
+    ("Other traffic", "only the vehicles of the case exist: nothing follows the ego, and no vehicle reacts to it"),
+    ("Consequences", "vehicles are rectangles along the road; no yaw, no second collision, no injuries"),
+];
+
+/// What the user and the build say of a sheet.
+#[derive(Debug, Clone, Default)]
+pub struct CaseIdentity {
+    /// Commit of the program's sources; empty if unknown.
+    pub commit: &'static str,
+    /// SHA-256 of the file with the case, if there is one.
+    pub file_sha256: Option<String>,
+    /// Date of the run, as the user gives it.
+    pub date: Option<String>,
+    /// Author, as the user gives it.
+    pub author: Option<String>,
+}
+
+impl CaseIdentity {
+    /// Lines to sign on, and what the drivers do not stand for.
+    pub(super) fn signatures(&self) -> Section {
+        let given = |text: &Option<String>| text.clone().unwrap_or_default();
+        Section::new("signature", "Signatures")
+            .intro("The system under assessment was not simulated: the drivers are those of the profile.")
+            .fact("system under assessment, version", "")
+            .fact("technical service", "")
+            .fact("date of the run", given(&self.date))
+            .fact("author", given(&self.author))
+            .fact("signature", "")
+            .fact("checked by, date", "")
+    }
+
+    /// What is not considered.
+    pub(super) fn not_considered() -> Section {
+        Section::new("not-considered", "Not considered").facts(NOT_CONSIDERED)
+    }
+}
+
+/// Program, version, commit by its first digits, and version of the lanes.
+pub(super) fn program(commit: &str, digits: usize) -> String {
+    let (commit, changes) = commit.split_at(commit.find(' ').unwrap_or(commit.len()));
+    let commit = match commit {
+        "" => "commit unknown".to_owned(),
+        commit => format!("commit {}{changes}", commit.get(..digits).unwrap_or(commit)),
+    };
+    format!("{PROGRAM}, {commit}, engine {ENGINE_VERSION}")
+}
+
+/// SHA-256 of a profile's values in canonical form: white space and comments of its file do not change it.
+///
+/// # Errors
+/// None for a profile of this program.
+pub(super) fn profile_sha256(profile: &Profile) -> Result<String> {
+    let mut canonical = Canonical::new("profile");
+    canonical.value(profile)?;
+    Ok(canonical.finish())
 }

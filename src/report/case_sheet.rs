@@ -5,12 +5,11 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::case_evidence::assumptions;
-use super::case_identity::{CaseIdentity, NOT_CONSIDERED, profile_sha256};
+use super::case_evidence::{CaseIdentity, NOT_CONSIDERED, assumptions, profile_sha256};
 use super::html::{Page, PageFigure, Section};
 use super::lanes::{outcome_record, with_outcomes};
 use super::records::{self, PROGRAM, record};
-use super::tables::{WIDTH, wrap};
+use super::tables::{WIDTH, indented, wrap};
 use super::trace::{TraceFigure, TraceSeries};
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::profile::Profile;
@@ -19,7 +18,7 @@ use lanesweep_run::check::{Boundary, Change, Judged, Judgement, Reading, RunEnd,
 use lanesweep_run::grid::VARIED;
 use lanesweep_support::readable::value;
 use lanesweep_support::run_folder::NamedTable;
-use lanesweep_support::table::{Column, NumberText, Table, json_number};
+use lanesweep_support::table::{Cell, Column, NumberText, Table, json_number};
 use lanesweep_support::{Result, option};
 
 /// What the columns of the drivers show.
@@ -93,11 +92,14 @@ impl CaseSheet<'_> {
         list
     }
 
+    /// The drivers by profile.
+    fn judged(&self) -> impl Iterator<Item = (&Judgement, &Judged)> {
+        self.judgements.iter().flat_map(|judgement| judgement.models.iter().map(move |judged| (judgement, judged)))
+    }
+
     fn drivers(&self) -> Table {
-        let judged =
-            self.judgements.iter().flat_map(|judgement| judgement.models.iter().map(move |of| (judgement, of)));
         let contact = |judged: &Judged| judged.trace.contact_label().split(' ').next();
-        let table = Table::of(judged)
+        let table = Table::of(self.judged())
             .column("profile", |(judgement, _)| judgement.profile.as_str())
             .column("model", |(_, judged)| judged.trace.model.name())
             .column("collision", |(judgement, judged)| verdict_of(judgement, judged))
@@ -119,13 +121,13 @@ impl CaseSheet<'_> {
 
     /// The drivers under the first profile, and those under the others that differ.
     fn drivers_by_profile(&self) -> [Table; 2] {
-        let (mut first, mut others) = (self.drivers(), self.drivers());
-        let profile = &self.first().profile;
-        let is_first: Vec<bool> = first.shown().1.iter().map(|row| row[0] == *profile).collect();
-        let (mut at, mut other_at) = (is_first.iter(), is_first.iter());
-        first.rows.retain(|_| at.next() == Some(&true));
-        others.rows.retain(|_| other_at.next() == Some(&false));
-        [first.captioned(format!("Drivers under {profile}")), others.captioned("Drivers under other profiles")]
+        let (Table { columns, rows, .. }, profile) = (self.drivers(), self.first().profile.as_str());
+        let (of_first, of_others) = rows.into_iter().partition(|row| row[0] == Cell::text(profile));
+        let table = |caption: String, rows| Table { caption, columns: columns.clone(), rows };
+        [
+            table(format!("Drivers under {profile}"), of_first),
+            table("Drivers under other profiles".to_owned(), of_others),
+        ]
     }
 
     fn clauses(&self) -> Table {
@@ -168,72 +170,53 @@ impl CaseSheet<'_> {
             .build()
     }
 
-    /// Where the case comes from, on a line before it; nothing for a case of flags.
-    fn source(&self) -> String {
-        if self.identity.file_sha256.is_some() { format!("{}:\n", self.origin) } else { String::new() }
+    /// Where the case comes from, if from a file, the case, and the answer.
+    fn head(&self) -> String {
+        let synthetic = if self.is_synthetic { "SYNTHETIC DATA: " } else { "" };
+        let origin = self.identity.file_sha256.as_ref().map_or(String::new(), |_| format!("{}:\n", self.origin));
+        format!("{synthetic}{origin}{}\n{}\n", self.case(), self.answer())
     }
 
     /// The answer on one screen.
     pub fn brief(&self) -> String {
-        let synthetic = if self.is_synthetic { "SYNTHETIC DATA: " } else { "" };
         let sentences = self.demand().into_iter().chain(self.silent()).chain(self.cautions());
-        let sentences = sentences.map(|sentence| format!("  {}\n", wrap(&sentence, WIDTH - 2).replace('\n', "\n  ")));
-        let [drivers, _] = self.drivers_by_profile();
+        let sentences: String = sentences.map(|sentence| indented(&sentence)).collect();
+        let ([drivers, _], boundaries) = (self.drivers_by_profile(), self.boundaries().text());
+        let (head, drivers, [full, sheet]) = (self.head(), drivers.text(), ["full", "sheet"].map(option));
         format!(
-            "{synthetic}{}{}\n{}\n{}{}Where another answer begins, all else equal; the last columns: another collision\n{}\
-             Other profiles, clauses, readings and hashes: {}, or a page to print: {}\n",
-            self.source(),
-            self.case(),
-            self.answer(),
-            sentences.collect::<String>(),
-            drivers.text(),
-            self.boundaries().text(),
-            option("full"),
-            option("sheet"),
+            "{head}{sentences}{drivers}Where another answer begins, all else equal; the last columns: another collision\n{boundaries}\
+             Other profiles, clauses, readings and hashes: {full}, or a page to print: {sheet}\n"
         )
     }
 
     /// The sheet as text.
     pub fn text(&self) -> String {
-        let synthetic = if self.is_synthetic { "SYNTHETIC DATA: " } else { "" };
-        let numbers: Vec<String> =
-            self.numbers().iter().map(|(name, number)| format!("  {name}: {number}\n")).collect();
-        let cautions = self
-            .rule()
-            .into_iter()
-            .chain(self.cautions())
-            .map(|caution| wrap(&caution, WIDTH - 2).replace('\n', "\n  "));
-        let sentences = self.demand().into_iter().chain(self.silent()).chain(cautions);
-        let demand: Vec<String> = sentences.map(|sentence| format!("  {sentence}\n")).collect();
+        let numbers: String = self.numbers().iter().map(|(name, number)| format!("  {name}: {number}\n")).collect();
+        let cautions = self.rule().into_iter().chain(self.cautions()).map(|caution| indented(&caution));
+        let unwrapped = self.demand().into_iter().chain(self.silent()).map(|sentence| format!("  {sentence}\n"));
+        let (head, sentences, profile) =
+            (self.head(), unwrapped.chain(cautions).collect::<String>(), &self.first().profile);
+        let [drivers, clauses, boundaries] =
+            [self.drivers(), self.clauses(), self.boundaries()].map(|table| table.text());
+        let of_drivers = wrap(&format!("Drivers. {DRIVERS}"), WIDTH);
+        let of_boundaries = wrap(&format!("Where the answer changes under {profile}. {BOUNDARIES}"), WIDTH);
+        let (by_rule, identity) = (self.by_rule_text(), self.identity_text());
         format!(
-            "{synthetic}{}{}\n{}\n{}{}\n{}\n{}\nClauses under {}\n{}\n{}\n{}\n{}",
-            self.source(),
-            self.case(),
-            self.answer(),
-            demand.concat(),
-            numbers.concat(),
-            wrap(&format!("Drivers. {DRIVERS}"), WIDTH),
-            self.drivers().text(),
-            self.first().profile,
-            self.clauses().text(),
-            wrap(&format!("Where the answer changes under {}. {BOUNDARIES}", self.first().profile), WIDTH),
-            self.boundaries().text() + &self.by_rule_text(),
-            self.identity_text(),
+            "{head}{sentences}{numbers}\n{of_drivers}\n{drivers}\nClauses under {profile}\n{clauses}\n{of_boundaries}\n\
+             {boundaries}{by_rule}\n{identity}"
         )
     }
 
     /// A row per driver and profile, per constant, and per rule.
     pub fn tables(&self) -> Vec<NamedTable> {
-        let drivers = self.judgements.iter().flat_map(|of| of.models.iter().map(move |judged| (of, judged)));
-        let drivers: Vec<_> = drivers.collect();
-        let profiles = Table::of(drivers.iter().copied())
+        let profiles = Table::of(self.judged())
             .column("profile", |(of, _)| of.profile.as_str())
             .column("verdict", |(of, _)| of.verdict().label())
             .column("model", |(_, judged)| judged.trace.model.name())
             .column("braking_s", |(_, judged)| judged.braking_s())
             .column("changes_with", |(_, judged)| judged.flips.join(", "))
             .column("is_contact_like", |(_, judged)| judged.touches);
-        let profiles = with_outcomes(profiles.build(), drivers.iter().map(|(_, judged)| &judged.trace));
+        let profiles = with_outcomes(profiles.build(), self.judged().map(|(_, judged)| &judged.trace));
         let tables =
             [("profiles", profiles), ("assumptions", assumptions(&self.profiles[0])), ("by_rule", self.rule_rows())];
         tables.map(|(name, table)| (name.to_owned(), table)).into()

@@ -40,7 +40,7 @@ pub struct CaseAnswer {
     /// Row, from 1 after the header.
     pub row: usize,
     /// Its key, if the table has keys.
-    id: Option<String>,
+    pub id: Option<String>,
     case: String,
     verdict: Verdict,
     answer: String,
@@ -117,11 +117,6 @@ impl CaseAnswer {
             numbers: Vec::new(),
         }
     }
-
-    /// Its key.
-    pub fn id(&self) -> Option<&str> {
-        self.id.as_deref()
-    }
 }
 
 /// The columns of `simulate`, with the model's name before, and the time of braking.
@@ -151,9 +146,8 @@ fn note(judgement: &Judgement) -> String {
         (Verdict::OutsideAnnex, Some(reason)) => reason.clone(),
         _ => {
             let of_drivers = judgement.models.iter().filter(|judged| !judged.flips.is_empty());
-            let text = of_drivers
-                .map(|judged| format!("{} changes with {}", judged.trace.model.name(), judged.flips.join(", ")));
-            text.collect::<Vec<_>>().join("; ")
+            let text = |of: &Judged| format!("{} changes with {}", of.trace.model.name(), of.flips.join(", "));
+            of_drivers.map(text).collect::<Vec<_>>().join("; ")
         }
     }
 }

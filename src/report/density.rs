@@ -1,30 +1,21 @@
 //! Densities as terminal tables.
 
-use std::fmt::Write;
 use std::path::Path;
 
 use serde::Serialize;
 
 use super::records::{record, sorted};
 use lanesweep_stats::density::{DensityModel, Exposure, Rate, Refused, SearchEnd, ValidFraction, standard_deviation};
-use lanesweep_support::readable::{count, count_of, significant};
+use lanesweep_support::readable::{count, significant};
 use lanesweep_support::table::{Column, Digits, Table};
 
 /// One density without its kernels.
 pub fn text(model: &DensityModel) -> String {
     let id = model.space.id();
     let provenance = &model.provenance;
-    let mut text = format!(
-        "{} {} ({}): density over {} scenarios; {} found, {} kept, {} left out\n",
-        id.category.label(),
-        id.key,
-        id.description(),
-        count_of(model.kde.points().len()),
-        count(provenance.found),
-        count(provenance.kept),
-        count(provenance.left_out)
-    );
-    text.push_str(&parameters(model).text());
+    let (category, key, description) = (id.category.label(), id.key, id.description());
+    let [found, kept, left_out] = [provenance.found, provenance.kept, provenance.left_out].map(count);
+    let (scenarios, parameters) = (count(model.kde.points().len()), parameters(model).text());
     let bandwidth = model.kde.bandwidth();
     let end = match bandwidth.end {
         SearchEnd::Inside => "",
@@ -35,29 +26,20 @@ pub fn text(model: &DensityModel) -> String {
         let [best, low, high] = [of.best, of.low, of.high].map(short);
         format!("; the likelihood's best is {best} [{low}, {high}]")
     });
-    let _ = writeln!(
-        text,
-        "bandwidth  {} (rule `{}`; Silverman's {}){end}{likelihood}",
-        short(bandwidth.value),
-        bandwidth.rule.key(),
-        short(bandwidth.silverman)
-    );
-    let valid = &model.valid;
-    let _ = writeln!(
-        text,
-        "P_valid    {:.4} [{:.4}, {:.4}], {} of {} draws, seed {}",
-        valid.estimate,
-        valid.low,
-        valid.high,
-        count(valid.valid),
-        count(valid.draws),
-        valid.seed
-    );
-    if !valid.refused.is_empty() {
-        let _ = writeln!(text, "refused    {}", refused(valid));
-    }
-    let _ = writeln!(text, "exposure   {}", model.exposure.as_ref().map_or(UNKNOWN.to_owned(), exposure));
-    text
+    let ([value, silverman], rule) = ([bandwidth.value, bandwidth.silverman].map(short), bandwidth.rule.key());
+    let ValidFraction { estimate, low, high, seed, .. } = model.valid;
+    let [valid, draws] = [model.valid.valid, model.valid.draws].map(count);
+    let refused = match &model.valid.refused[..] {
+        [] => String::new(),
+        _ => format!("refused    {}\n", refused(&model.valid)),
+    };
+    format!(
+        "{category} {key} ({description}): density over {scenarios} scenarios; {found} found, {kept} kept, {left_out} left out\n\
+         {parameters}bandwidth  {value} (rule `{rule}`; Silverman's {silverman}){end}{likelihood}\n\
+         P_valid    {estimate:.4} [{low:.4}, {high:.4}], {valid} of {draws} draws, seed {seed}\n\
+         {refused}exposure   {}\n",
+        model.exposure.as_ref().map_or(UNKNOWN.to_owned(), exposure)
+    )
 }
 
 /// The same as [`text`], with its file, as JSON; unknown values are null.
@@ -112,14 +94,9 @@ fn exposure(exposure: &Exposure) -> String {
     let mut parts = vec![format!("{} events", count(exposure.events))];
     let mut rate = |rate: &Option<Rate>, driven: Option<f64>, unit: &str| {
         if let (Some(rate), Some(driven)) = (rate, driven) {
-            parts.push(format!(
-                "in {} {unit}: {} per {unit} ± {} (√n), [{}, {}] exact",
-                short(driven),
-                short(rate.estimate),
-                short(rate.standard_deviation),
-                short(rate.low),
-                short(rate.high)
-            ));
+            let numbers = [driven, rate.estimate, rate.standard_deviation, rate.low, rate.high];
+            let [driven, mean, deviation, low, high] = numbers.map(short);
+            parts.push(format!("in {driven} {unit}: {mean} per {unit} ± {deviation} (√n), [{low}, {high}] exact"));
         }
     };
     rate(&exposure.per_hour, exposure.driven.hours, "h");

@@ -4,14 +4,14 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use super::case_identity::program;
+use super::case_evidence::program;
 use super::html::Section;
 use lanesweep_engine::{DeviceRecord, OpenBackend, SweepSummary};
 use lanesweep_model::profile::Profile;
 use lanesweep_support::readable::{count, counted};
 
 /// Facts about the machine.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct Host {
     /// Commit of the program; empty if unknown. Records have it beside the program's version.
     #[serde(skip)]
@@ -53,32 +53,13 @@ impl Host {
 
     /// For the merged parts of a run, which had their own machines and commands.
     pub fn of_parts(commit: &'static str, parts: usize, rechecked_lanes: u64) -> Host {
-        Host {
-            commit,
-            backend: format!("{} merged", counted(parts, "part")),
-            device: None,
-            rechecked_lanes,
-            seconds: 0.0,
-            threads: rayon::current_num_threads(),
-            settings: Vec::new(),
-        }
+        let (backend, threads) = (format!("{} merged", counted(parts, "part")), rayon::current_num_threads());
+        Host { commit, backend, rechecked_lanes, threads, ..Host::default() }
     }
 
-    /// The chapter on what repeats a run.
+    /// The chapter on what repeats a run: what computed, whether a device computed as the CPU does, and the options that are not
+    /// the default.
     pub(super) fn section(&self, profile: &Profile) -> Section {
-        Section::new("reproduction", "Reproduction")
-            .intro(
-                "The same input, profile, options and program give the same numbers on any machine. The record beside this page \
-                 holds them, with checksums.",
-            )
-            .fact("program", program(self.commit, 40))
-            .fact("profile", &profile.name)
-            .host(self.facts())
-            .parts([Section::options("Profile", profile)])
-    }
-
-    /// What computed, whether a device computed as the CPU does, and the options that are not the default.
-    pub(super) fn facts(&self) -> Vec<(&'static str, String)> {
         let equal = match &self.device {
             None => "no device computed a lane".to_owned(),
             Some(device) if device.exact_path => format!("{}: operations reach the driver unchanged", device.line()),
@@ -92,10 +73,16 @@ impl Host {
         let set: Vec<String> =
             set.map(|setting| format!("{} = {} ({})", setting.key, setting.value, setting.source)).collect();
         let set = (!set.is_empty()).then(|| ("options that are set", set.join("\n")));
-        [("computed by", self.backend.clone()), ("GPU = CPU", equal), ("checked", again)]
-            .into_iter()
-            .chain(set)
-            .collect()
+        Section::new("reproduction", "Reproduction")
+            .intro(
+                "The same input, profile, options and program give the same numbers on any machine. The record beside this page \
+                 holds them, with checksums.",
+            )
+            .fact("program", program(self.commit, 40))
+            .fact("profile", &profile.name)
+            .host([("computed by", self.backend.clone()), ("GPU = CPU", equal), ("checked", again)])
+            .host(set)
+            .parts([Section::options("Profile", profile)])
     }
 
     /// The commit for records; null if unknown.

@@ -24,8 +24,9 @@ pub fn study_table(path: &Path, study: &Study) -> Result<TableWriter> {
     make_folder_of(path)?;
     let facts = study.facts();
     let value = if facts.reference { ColumnKind::Binary64 } else { ColumnKind::Binary32 };
-    let of = (study.plan().profile.name.clone(), Some(study.plan().hash().to_owned()));
-    create(path, "lanes", of, facts.synthetic, columns(value))
+    let (profile, plan_sha256) = (Some(study.plan().profile.name.clone()), Some(study.plan().hash().to_owned()));
+    let metadata = TableMetadata { table: "lanes", profile, plan_sha256, synthetic: facts.synthetic };
+    TableWriter::create(path, table_format(path, "rows")?, columns(value), &metadata)
 }
 
 /// A table for lanes of a sampling run; see [`write_sampled_chunk`] and [`write_failing_lane`].
@@ -33,9 +34,10 @@ pub fn study_table(path: &Path, study: &Study) -> Result<TableWriter> {
 /// # Errors
 /// [`Error::Io`]; [`Error::Usage`] for an unknown ending of the name.
 pub fn sampled_table(path: &Path, sample: &Sample) -> Result<TableWriter> {
-    let (density, plan_sha256) = (&sample.density, sample.lane_plan().map(|plan| plan.hash().to_owned()));
-    let profile = sample.profile.name.clone();
-    create(path, "samples", (profile, plan_sha256), density.provenance.synthetic, sampled_columns(density))
+    let plan_sha256 = sample.lane_plan().map(|plan| plan.hash().to_owned());
+    let (profile, synthetic) = (Some(sample.profile.name.clone()), sample.density.provenance.synthetic);
+    let metadata = TableMetadata { table: "samples", profile, plan_sha256, synthetic };
+    TableWriter::create(path, table_format(path, "rows")?, sampled_columns(&sample.density), &metadata)
 }
 
 /// The format of a table of lanes, from the file name that a flag gives.
@@ -44,17 +46,6 @@ pub fn sampled_table(path: &Path, sample: &Sample) -> Result<TableWriter> {
 /// [`Error::Usage`] for an unknown ending of the name.
 pub fn table_format(path: &Path, flag: &str) -> Result<TableFormat> {
     TableFormat::of(path, &TableFormat::EVERY, &option(flag))
-}
-
-fn create(
-    path: &Path,
-    table: &'static str,
-    (profile, plan_sha256): (String, Option<String>),
-    synthetic: bool,
-    columns: Vec<Column>,
-) -> Result<TableWriter> {
-    let metadata = TableMetadata { table, profile: Some(profile), plan_sha256, synthetic };
-    TableWriter::create(path, table_format(path, "rows")?, columns, &metadata)
 }
 
 /// The columns of a study's lanes, in their order. `value` is the arithmetic of the numbers: binary32, or binary64 of

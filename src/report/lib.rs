@@ -4,28 +4,22 @@
 //! `run.json`. It computes nothing beyond formatting. Scores come from [`lanesweep_run::score`]; text and files go to the
 //! user.
 
-mod case_evidence;
-pub mod case_identity;
-mod case_sensitivity;
+pub mod case_evidence;
 mod case_sentences;
 pub mod case_sheet;
 pub mod case_table;
 pub mod column_words;
 pub mod density;
-mod dots;
-mod explorer;
 pub mod host;
 mod html;
 pub mod lanes;
 pub mod map;
-mod map_record;
 mod map_sheet;
 mod map_tables;
 pub mod openscenario;
 mod plot;
 pub mod records;
 pub mod sampling;
-mod sampling_page;
 pub mod sampling_tables;
 pub mod study;
 mod study_answer;

@@ -99,16 +99,16 @@ impl MapSheet<'_> {
             }
         }
         let at = |(i, j): (usize, usize)| (across[i], up[j]);
-        let lines = boundary(self.grid, &kind).into_iter().map(|(a, b)| vec![at(a), at(b)]);
+        let lines = |kind: &dyn Fn(usize, usize) -> usize| {
+            boundary(self.grid, kind).into_iter().map(|(a, b)| vec![at(a), at(b)]).collect()
+        };
         let attributes = "class=\"boundary\" stroke-linecap=\"square\"";
-        let rule = Rule { runs: lines.collect(), colour: INK, width_px: 1.2, attributes, ..Rule::default() };
+        let rule = Rule { runs: lines(&kind), colour: INK, width_px: 1.2, attributes, ..Rule::default() };
         let not_preventable = self.not_preventable.iter().filter(|cells| cells.contains(&true)).map(|cells| {
-            let kind = |i: usize, j: usize| usize::from(cells[self.grid.cell(panel, i, j)]);
-            let lines = boundary(self.grid, &kind).into_iter().map(|(a, b)| vec![at(a), at(b)]);
             let count = cells.iter().filter(|is_not_preventable| **is_not_preventable).count();
             let (word, all) = (Answer::NotPreventable.label(), self.possible_cells());
             Rule {
-                runs: lines.collect(),
+                runs: lines(&|i, j| usize::from(cells[self.grid.cell(panel, i, j)])),
                 name: format!("around what is {word}, CCHDM and FSM both collide: {count} of {all}"),
                 colour: BOUNDARY,
                 width_px: 1.8,

@@ -6,7 +6,7 @@ use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::scenario::Category;
 use lanesweep_run::grid::{CaseQuantity, CellOutcome, MappedGrid, VARIED};
-use lanesweep_support::readable;
+use lanesweep_support::readable::count;
 use lanesweep_support::table::{Column, Digits, NumberText, Table};
 
 impl MapReport {
@@ -17,12 +17,8 @@ impl MapReport {
 
     /// What the fractions are of.
     pub(super) fn caption(&self) -> String {
-        format!(
-            "Share of cells that fail {} under {}, of {} simulations",
-            self.criterion.label(),
-            self.profile.name,
-            readable::count(self.simulations())
-        )
+        let (criterion, profile, all) = (self.criterion.label(), &self.profile.name, count(self.simulations()));
+        format!("Share of cells that fail {criterion} under {profile}, of {all} simulations")
     }
 
     /// Fractions as a table.
@@ -56,27 +52,17 @@ impl MapReport {
 
     /// What the columns count, and cautions.
     pub(super) fn words(&self) -> String {
-        let mut text = String::new();
-        if self.grids.iter().any(|mapped| mapped.is_chosen_to_match) {
-            text.push_str(
-                "* The known grid is not published. Ours was chosen so that the share of RSS comes out: that it agrees \
-                 confirms nothing.\n",
-            );
-        }
-        text.push_str(&self.words_of_outcomes(&self.shown_outcomes()));
-        text
-    }
-
-    /// What the columns count.
-    fn words_of_outcomes(&self, outcomes: &[CellOutcome]) -> String {
+        let of_grid = self.grids.iter().any(|mapped| mapped.is_chosen_to_match).then_some(
+            "* The known grid is not published. Ours was chosen so that the share of RSS comes out: that it agrees \
+             confirms nothing.\n",
+        );
+        let turns = match self.is_robust() {
+            true => format!("the outcome changes with one of these (the step in binary64): {VARIED}; or "),
+            false => String::new(),
+        };
         let undecided = format!(
-            "Undecided: {}an ego that never reacts is still closing in at the time cap of {} s; the share counts these cells as \
+            "Undecided: {turns}an ego that never reacts is still closing in at the time cap of {} s; the share counts these cells as \
              computed.\n",
-            if self.is_robust() {
-                format!("the outcome changes with one of these (the step in binary64): {VARIED}; or ")
-            } else {
-                String::new()
-            },
             self.profile.frame.time_cap_s,
         );
         let sentence = |outcome: &CellOutcome| match outcome {
@@ -99,8 +85,9 @@ impl MapReport {
             }
             Criterion::Ttc | Criterion::Btn => "",
         };
-        let cautions = self.cautions();
-        outcomes.iter().map(sentence).chain([of_all]).chain(cautions.iter().map(String::as_str)).collect()
+        let (outcomes, cautions) = (self.shown_outcomes(), self.cautions());
+        let of_outcomes = outcomes.iter().map(sentence).chain([of_all]);
+        of_grid.into_iter().chain(of_outcomes).chain(cautions.iter().map(String::as_str)).collect()
     }
 
     /// Sentences on cells whose case is not what a reader would take it for.
@@ -110,18 +97,15 @@ impl MapReport {
             let brakes = (0..plan.grid.cell_count())
                 .any(|cell| plan.grid.point(cell).get(CaseQuantity::Deceleration).is_some_and(|a| a != 0.0));
             let of_leaders = format!("{CLAUSE_OF_LEADERS}.\n");
-            let is_lvd = plan.grid.category == Category::Lvd && !self.profile.reg157.clause.is_empty();
-            if brakes && is_lvd && !all.contains(&of_leaders) {
-                all.push(of_leaders);
-            }
-            let is_clause = plan.grid.category == Category::CutIn && !self.profile.reg157.clause.is_empty();
-            if brakes && is_clause && map.models.contains(&ModelId::Reg157) {
-                all.push(format!(
-                    "Reg157 in {}: a vehicle that brakes while it cuts in does not keep its speed, so {} demands nothing of these \
-                     cells, whatever the model does.\n",
-                    plan.grid.name,
-                    self.profile.reg157.clause
-                ));
+            let (name, clause) = (&plan.grid.name, &self.profile.reg157.clause);
+            match plan.grid.category {
+                _ if !brakes || clause.is_empty() => {}
+                Category::Lvd if !all.contains(&of_leaders) => all.push(of_leaders),
+                Category::CutIn if map.models.contains(&ModelId::Reg157) => all.push(format!(
+                    "Reg157 in {name}: a vehicle that brakes while it cuts in does not keep its speed, so {clause} demands nothing of \
+                     these cells, whatever the model does.\n"
+                )),
+                _ => {}
             }
         }
         all

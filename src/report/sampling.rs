@@ -1,18 +1,18 @@
 //! A sampling run as files and as text.
 
-use std::fmt::Write;
-
 use super::host::Host;
+use super::html::{Page, Section};
 use super::records::{PROGRAM, document, publish, record};
 use super::sampling_tables::convergence_table;
 use super::tables::paragraph;
 use lanesweep_engine::generated::ATTEMPTS;
 use lanesweep_engine::{ENGINE_VERSION, LanePlan, SampleTally};
+use lanesweep_model::criterion::Criterion;
 use lanesweep_model::scenario::parameterization::Parameterization;
 use lanesweep_run::sampling::{EstimateRow, RiskRate, Sample, SampleResult, proposal_text};
 use lanesweep_stats::estimate::{IntervalKind, WeightFigures};
 use lanesweep_support::Result;
-use lanesweep_support::readable::{count, count_of, counted, significant, value};
+use lanesweep_support::readable::{count, counted, significant, value};
 use lanesweep_support::run_folder::{ResultFiles, Results};
 use lanesweep_support::table::{Column, Digits, NumberText, Table, TableOf};
 
@@ -127,26 +127,18 @@ impl<'a> SampleReport<'a> {
 
     /// The text for the terminal.
     pub fn text(&self) -> String {
-        let mut text = String::new();
         let density = &self.sample.density;
-        let _ = writeln!(
-            text,
-            "{}: density over {} scenarios ({})",
-            self.name(),
-            count_of(density.kde.points().len()),
-            density.provenance.data
-        );
+        let (scenarios, data) = (count(density.kde.points().len()), &density.provenance.data);
+        let mut text = format!("{}: density over {scenarios} scenarios ({data})\n", self.name());
         if let Some((tally, plan)) = self.drawn() {
             let some = |count: u64, text: String| if count > 0 { text } else { String::new() };
             let (voids, capped) = (tally.voids, tally.capped.iter().sum());
-            let _ = writeln!(
-                text,
-                "{} samples, {} lanes; {:.2} % of the draws invalid and drawn again{}{}",
-                count(tally.samples()),
-                count(lanes(tally, plan)),
-                100.0 * rejected(tally),
-                some(voids, format!(", {} samples void (none of {ATTEMPTS} draws valid)", count(voids))),
-                some(capped, format!("; {} lanes ended at the time cap", count(capped))),
+            let void = some(voids, format!(", {} samples void (none of {ATTEMPTS} draws valid)", count(voids)));
+            let capped = some(capped, format!("; {} lanes ended at the time cap", count(capped)));
+            let ([samples, lanes], percent) =
+                ([tally.samples(), lanes(tally, plan)].map(count), 100.0 * rejected(tally));
+            text += &format!(
+                "{samples} samples, {lanes} lanes; {percent:.2} % of the draws invalid and drawn again{void}{capped}\n"
             );
         }
         text.push_str(&self.table(|row| row.is_overall(self.estimates())).text());
@@ -159,21 +151,14 @@ impl<'a> SampleReport<'a> {
             text += &paragraph(note);
         }
         let is_compared = self.estimates().iter().any(|row| row.recorded.is_some_and(|of| of.sampled.is_some()));
-        let rest = format!(
-            "Intervals at {} %: of the draws, and{}. {}{}",
-            value(100.0 * self.level()),
-            self.interval_rule(),
-            if is_compared {
-                "P/S, beside the recorded scenarios: = agrees, > too high, < too low, ? undecided. "
-            } else {
-                ""
-            },
-            match notes.len().saturating_sub(MAX_NOTES) {
-                0 => "More on the page.".to_owned(),
-                more => format!("{} and more on the page.", counted(more, "further note")),
-            }
-        );
-        text += &paragraph(&rest);
+        let marks = "P/S, beside the recorded scenarios: = agrees, > too high, < too low, ? undecided. ";
+        let more = match notes.len().saturating_sub(MAX_NOTES) {
+            0 => "More".to_owned(),
+            more => format!("{} and more", counted(more, "further note")),
+        };
+        let (level, rule, marks) =
+            (value(100.0 * self.level()), self.interval_rule(), if is_compared { marks } else { "" });
+        text += &paragraph(&format!("Intervals at {level} %: of the draws, and{rule}. {marks}{more} on the page."));
         if density.provenance.synthetic {
             text.push_str("SYNTHETIC DATA: no number above is a statement about real traffic\n");
         }
@@ -260,8 +245,87 @@ impl<'a> SampleReport<'a> {
     }
 
     /// Whether rare failures have an estimate by importance sampling, too.
-    pub(super) fn has_rare(&self) -> bool {
+    fn has_rare(&self) -> bool {
         self.estimates().iter().any(|row| row.is_rare_beside(self.estimates()))
+    }
+
+    /// `report.html`.
+    ///
+    /// # Errors
+    /// As `DensityModel::content_sha256`.
+    fn html(&self) -> Result<String> {
+        let density = &self.sample.density;
+        let mut warnings = Vec::new();
+        if !self.is_reproducible() {
+            warnings.push("Ended by the clock: another machine ends elsewhere.".to_owned());
+        }
+        let clock = (self.host.seconds > 0.0)
+            .then(|| ("seconds", format!("{:.2} on {} threads", self.host.seconds, self.host.threads)));
+        let reproduction =
+            self.host.section(&self.sample.profile).fact("SHA-256 of the density", density.content_sha256()?);
+        let sections = vec![self.estimates_section(), reproduction.host(clock).folded()];
+        // Importance sampling seldom needs the maximum that it may draw; its runs include the search.
+        let runs = self.estimates().iter().map(|row| row.estimate.runs).max();
+        let drawn = self.drawn().map(|(tally, _)| tally.samples()).or(runs).unwrap_or(self.sample.options.stop.samples);
+        let (highest, drawn, scenarios) = (self.sentence(), count(drawn), count(density.kde.points().len()));
+        let (profile, data) = (&self.sample.profile.name, &density.provenance.data);
+        let rare = if self.has_rare() { ", rare failures by is" } else { "" };
+        let estimator = self.sample.options.estimator.key();
+        let page = Page {
+            title: format!("Probability of failure: {}", self.name()),
+            lead: format!(
+                "{highest}{drawn} samples of a density over {scenarios} mined scenarios, estimator {estimator}{rare}, profile \
+                 {profile}. {data}"
+            ),
+            synthetic: density.provenance.synthetic,
+            warnings,
+            app: None,
+            sections,
+        };
+        Ok(page.html())
+    }
+
+    /// `cut-in 2`.
+    fn name(&self) -> String {
+        format!("{} {}", self.id().category.label(), self.id().key)
+    }
+
+    /// The largest probability of a collision, or of another criterion.
+    fn sentence(&self) -> String {
+        let rows = || self.estimates().iter().filter(|row| row.is_told(self.estimates()));
+        let by = |a: &&EstimateRow, b: &&EstimateRow| a.estimate.probability.total_cmp(&b.estimate.probability);
+        let collisions = rows().filter(|row| row.criterion == Criterion::Collision).max_by(by);
+        let Some(row) = collisions.or_else(|| rows().max_by(by)) else { return String::new() };
+        let [p, low, high] = [row.estimate.probability, row.estimate.interval.low, row.estimate.interval.high];
+        let [p, low, high] = [p, low, high].map(|share| significant(100.0 * share, 2));
+        let (model, criterion) = (row.model.name(), row.criterion.label());
+        format!("Highest: {model} fails {criterion} in {p} % [{low} {high}] of the runs (THW {}). ", row.headway)
+    }
+
+    fn estimates_section(&self) -> Section {
+        let estimates = self.table(|row| row.is_told(self.estimates()));
+        let mut tables = vec![estimates.captioned(format!(
+            "Probability of failure, and risk where the exposure is known. Intervals at {} %: of the draws, and{}",
+            value(100.0 * self.level()),
+            self.interval_rule()
+        ))];
+        let bandwidths = self.bandwidths();
+        if !bandwidths.rows.is_empty() {
+            tables.push(bandwidths.captioned("P at the ends of the 95 % interval of the bandwidth"));
+        }
+        let weights = self.weights();
+        if !weights.rows.is_empty() {
+            tables.push(weights.captioned("Weights: how much of the sample counts"));
+        }
+        Section::new("estimates", "Estimates")
+            .intro(format!(
+                "A rate is the recordings' where the density agrees with the recorded scenarios. It is carried by the \
+                 scenarios that fail where these are effectively fewer than ten. ≤ bounds from above where nothing failed. \
+                 {}",
+                self.rules().map(|rule| rule + ". ").collect::<String>()
+            ))
+            .tables(tables)
+            .facts(self.remarks())
     }
 }
 

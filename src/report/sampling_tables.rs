@@ -8,7 +8,7 @@ use lanesweep_run::sampling::{
     BandwidthVerdict, CarrierRow, Checkpoint, EstimateRow, RiskRate, TRAFFIC_DRAWS, Uncertainty,
 };
 use lanesweep_stats::estimate::{Ratio, Warning, WeightFigures};
-use lanesweep_support::readable::{count, count_of, counted, significant};
+use lanesweep_support::readable::{count, counted, significant};
 use lanesweep_support::table::{NamedValue, Table};
 
 impl SampleReport<'_> {
@@ -29,11 +29,12 @@ impl SampleReport<'_> {
             ("hours_factor", |u| u.hours_factor),
             ("samples_factor", |u| u.samples_factor),
         ];
-        let replayed = |row: &EstimateRow| row.recorded.map(|recorded| recorded.replayed);
-        let sampled = |row: &EstimateRow| row.recorded.and_then(|recorded| recorded.sampled);
-        let per_hour = |row: &EstimateRow| row.risk.per_hour;
-        let per_1000_km = |row: &EstimateRow| row.risk.per_1000_km;
-        let [hour, kilometres] = ["risk_per_hour", "risk_per_1000_km"];
+        let rates: [NamedValue<EstimateRow, Option<RiskRate>>; 2] =
+            [("risk_per_hour", |row| row.risk.per_hour), ("risk_per_1000_km", |row| row.risk.per_1000_km)];
+        let ratios: [NamedValue<EstimateRow, Option<Ratio>>; 2] = [
+            ("replayed_ratio", |row| row.recorded.map(|recorded| recorded.replayed)),
+            ("sampled_ratio", |row| row.recorded.and_then(|recorded| recorded.sampled)),
+        ];
         Table::of(self.estimates())
             .column("category", |_| self.id().category.key())
             .column("variant", |_| self.id().key)
@@ -66,21 +67,15 @@ impl SampleReport<'_> {
                 |row, (_, end)| row.at_bandwidths[end].map(|of| of.probability).filter(|p| *p > 0.0),
             )
             .columns(weights, |(name, _)| name, |row, (_, of)| row.estimate.weights.as_ref().and_then(|w| known(of(w))))
-            .columns(risks, |(end, _)| format!("{hour}{end}"), |row, (_, of)| per_hour(row).and_then(|r| known(of(&r))))
             .columns(
-                risks,
-                |(end, _)| format!("{kilometres}{end}"),
-                |row, (_, of)| per_1000_km(row).and_then(|r| known(of(&r))),
+                rates.into_iter().flat_map(|rate| risks.map(|of| (rate, of))),
+                |(rate, of)| format!("{}{}", rate.0, of.0),
+                |row, (rate, of)| rate.1(row).and_then(|rate| known(of.1(&rate))),
             )
             .columns(
-                ends,
-                |(end, _)| format!("replayed_ratio{end}"),
-                |row, (_, of)| replayed(row).and_then(|ratio| of(&ratio)).and_then(known),
-            )
-            .columns(
-                ends,
-                |(end, _)| format!("sampled_ratio{end}"),
-                |row, (_, of)| sampled(row).and_then(|ratio| of(&ratio)).and_then(known),
+                ratios.into_iter().flat_map(|ratio| ends.map(|of| (ratio, of))),
+                |(ratio, of)| format!("{}{}", ratio.0, of.0),
+                |row, (ratio, of)| ratio.1(row).and_then(|ratio| of.1(&ratio)).and_then(known),
             )
             .columns(
                 sources,
@@ -238,7 +233,7 @@ impl SampleReport<'_> {
         let kernels = self.sample.density.kde.points().len();
         let is_below = self.estimates().iter().any(|row| row.is_overall(self.estimates()) && row.is_of_tails(kernels));
         is_below.then(|| {
-            let (resolved, kernels) = (short(1.0 / kernels as f64), count_of(kernels));
+            let (resolved, kernels) = (short(1.0 / kernels as f64), count(kernels));
             format!("Probabilities below {resolved} (one in {kernels} scenarios) come from the tails of the density's kernels, not from data")
         })
     }

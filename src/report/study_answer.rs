@@ -7,7 +7,7 @@ use super::tables::{reference_text, wrap};
 use lanesweep_engine::Headway;
 use lanesweep_model::scenario::Category;
 use lanesweep_run::score::{Best, BestScore, CategoryScores};
-use lanesweep_support::readable::{count, count_of, counted, significant};
+use lanesweep_support::readable::{count, counted, significant};
 use lanesweep_support::table::{NumberText, Table};
 
 /// Width of the screen in columns, and minimum width of a narrower one.
@@ -103,17 +103,18 @@ impl StudyReport<'_> {
     fn size(&self) -> String {
         let kinds =
             self.evaluation.scores.categories.iter().map(|c| format!("{} {}s", count(c.scenarios), c.category.label()));
-        format!(
-            "{}; {}, {}{}: {} runs",
-            kinds.collect::<Vec<_>>().join(", "),
-            self.headways_in_words(),
-            counted(self.evaluation.scores.categories.first().map_or(0, |c| c.models.len()), "driver"),
-            match self.study.plan().profile.name.as_str() {
-                "paper" => String::new(),
-                name => format!(", profile {name}"),
-            },
-            count(self.lanes())
-        )
+        let (kinds, headways) = (kinds.collect::<Vec<_>>().join(", "), self.headways_in_words());
+        let (drivers, runs) = (counted(self.drivers(), "driver"), count(self.lanes()));
+        let profile = match self.study.plan().profile.name.as_str() {
+            "paper" => String::new(),
+            name => format!(", profile {name}"),
+        };
+        format!("{kinds}; {headways}, {drivers}{profile}: {runs} runs")
+    }
+
+    /// The number of driver models.
+    pub(super) fn drivers(&self) -> usize {
+        self.evaluation.scores.categories.first().map_or(0, |of| of.models.len())
     }
 
     fn question(&self) -> String {
@@ -143,16 +144,14 @@ impl StudyReport<'_> {
         let capped: Vec<&CappedRecord> = categories.iter().flat_map(|of| &of.capped_s).collect();
         let runs: u64 = capped.iter().map(|of| of.runs).sum();
         if runs > 0 {
-            let least = capped.iter().filter_map(|of| of.min_ttc_s).reduce(f64::min);
-            let least = least
-                .map_or("none approaches".to_owned(), |s| format!("their smallest TTC is {} s", significant(s, 2)));
+            let least = match capped.iter().filter_map(|of| of.min_ttc_s).reduce(f64::min) {
+                Some(s) => format!("their smallest TTC is {} s", significant(s, 2)),
+                None => "none approaches".to_owned(),
+            };
             let cap_s = self.study.plan().profile.frame.time_cap_s;
             let all: u64 = scores.categories.iter().map(|of| of.simulations * of.models.len() as u64).sum();
-            text += &format!(
-                " {} of {} runs of S were undecided after {cap_s} s and count as passed; {least}.",
-                count(runs),
-                count(all)
-            );
+            let [runs, all] = [runs, all].map(count);
+            text += &format!(" {runs} of {all} runs of S were undecided after {cap_s} s and count as passed; {least}.");
         }
         text
     }
@@ -208,7 +207,7 @@ impl StudyReport<'_> {
         }
         let more = self.evaluation.best.len().saturating_sub(MAX_ROWS);
         if more > 0 {
-            lines.push(format!("… and {} more: results.csv", count_of(more)));
+            lines.push(format!("… and {} more: results.csv", count(more)));
         }
         lines
     }

@@ -1,12 +1,13 @@
 //! The figures of a study: F1 with intervals and as the radar chart of the paper.
 
-use super::dots::dots;
-use super::plot::{Figure, Look, Mark, Name, Plot, PlotAxis, Series, Value, is_few};
+use super::plot::{
+    Figure, GREY, Height, Look, Mark, Name, Plot, PlotAxis, Rule, Series, Value, is_few, name_height_px,
+};
 use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::scenario::Category;
 use lanesweep_model::scenario::parameterization::Parameterization;
-use lanesweep_run::score::{CROSS_VALIDATED, CategoryScores, ScoreInterval, f1};
+use lanesweep_run::score::{CROSS_VALIDATED, CategoryScores, f1};
 
 /// `FSM, TTC`.
 fn cell_name((model, criterion): &(ModelId, Criterion)) -> String {
@@ -32,10 +33,6 @@ fn cells(scores: &CategoryScores) -> Vec<(ModelId, Criterion)> {
     scores.models.iter().flat_map(|&model| Criterion::ALL.map(|criterion| (model, criterion))).collect()
 }
 
-fn ends(interval: Option<ScoreInterval>) -> Option<(f64, f64)> {
-    interval.map(|interval| (interval.low, interval.high))
-}
-
 /// F1 of every parameterization with its interval: a row per driver model and criterion; of a single driver a row per
 /// parameterization.
 pub(super) fn f1_intervals(scores: &CategoryScores, confidence: f64, data: &str) -> Figure {
@@ -44,7 +41,7 @@ pub(super) fn f1_intervals(scores: &CategoryScores, confidence: f64, data: &str)
     let note = |cell: &(ModelId, Criterion)| format!("n = {}", failing(cell));
     let value = |row: usize, variant: usize, cell: &(ModelId, Criterion)| {
         let of = &scores.cells[scores.index(variant, cell.0, cell.1)?];
-        let (interval, is_few) = (ends(of.f1_interval), is_few(failing(cell) as f64));
+        let (interval, is_few) = (of.f1_interval.map(|of| (of.low, of.high)), is_few(failing(cell) as f64));
         Some(Value { interval, is_few, ..Value::from((f1(&of.counts)?, row as f64)) })
     };
     let is_single = scores.models.len() == 1;
@@ -88,17 +85,18 @@ pub(super) fn radar(scores: &CategoryScores, data: &str) -> Figure {
         let (spoke, failing) = (cell_name(cell), scores.failing_scenarios(cell.0, cell.1));
         let words = match is_empty(cell) {
             true => format!("{spoke} (undefined)"),
-            false => format!("{spoke}{}", few(failing)),
+            false if is_few(failing as f64) => format!("{spoke} (n\u{a0}=\u{a0}{failing})"),
+            false => spoke,
         };
         Name { at: at as f64, words, is_empty: is_empty(cell), ..Name::default() }
     };
-    let series = |variant: usize| {
+    let series = |(place, &variant): (usize, &usize)| {
         let value = |(at, cell): (usize, &(ModelId, Criterion))| Value {
             is_few: is_few(scores.failing_scenarios(cell.0, cell.1) as f64),
             ..Value::from((at as f64, score(variant, cell).unwrap_or(f64::NAN)))
         };
         // Many values are equal, most often 1: lines of equal weight, markers that shrink.
-        let look = Look { line_px: 1.4, ..look_of(&variants, variant) };
+        let look = Look { line_px: 1.4, ..Look::of(place, variants.len()) };
         let values = cells.iter().enumerate().map(value);
         Series::new(legend_name(scores, variant), &[Mark::Line, Mark::Points], values).with_look(look)
     };
@@ -109,7 +107,7 @@ pub(super) fn radar(scores: &CategoryScores, data: &str) -> Figure {
             ..PlotAxis::new("", 0.0, cells.len() as f64)
         },
         y: PlotAxis { names: rings.to_vec(), ..PlotAxis::new("F1", 0.0, 1.0) },
-        series: variants.iter().copied().map(series).collect(),
+        series: variants.iter().enumerate().map(series).collect(),
         is_polar: true,
         ..Plot::default()
     };
@@ -144,13 +142,48 @@ pub(super) fn short_name(key: &str) -> &str {
     key.strip_suffix(CROSS_VALIDATED).unwrap_or(key)
 }
 
-/// Colour and marker of one of the variants that a figure shows.
-fn look_of(shown: &[usize], variant: usize) -> Look {
-    Look::of(shown.iter().position(|at| *at == variant).unwrap_or(0), shown.len())
-}
+/// Height of a line, and of the space below a row, px.
+const LINE_PX: f64 = 8.0;
+const ROW_GAP_PX: f64 = 12.0;
 
-/// Text for a heading if there are few scenarios.
-fn few(failing_scenarios: u64) -> String {
-    let is_few = is_few(failing_scenarios as f64);
-    if is_few { format!(" (n\u{a0}=\u{a0}{failing_scenarios})") } else { String::new() }
+/// A plot of rows with a name at the left and a note at the right. Values have the index of their row as y; an estimate is
+/// at x, its intervals along it.
+fn dots(rows: &[(String, String)], x: PlotAxis, series: Vec<Series>) -> Plot {
+    let lines = series.len();
+    let names_px = rows.iter().map(|(words, _)| name_height_px(words) + 6.0).fold(24.0, f64::max);
+    let row_px = (lines as f64 * LINE_PX + ROW_GAP_PX).max(names_px);
+    let height_px = rows.len() as f64 * row_px;
+    let name = |(index, (words, note)): (usize, &(String, String))| Name {
+        at: -(index as f64 * row_px),
+        words: words.clone(),
+        note: note.clone(),
+        ..Name::default()
+    };
+    let line = |(line, series): (usize, Series)| {
+        let look = series.look.unwrap_or_else(|| Look::of(line, lines));
+        let value = |value: Value| {
+            let y = -(value.y * row_px) - ROW_GAP_PX / 2.0 - (line as f64 + 0.5) * LINE_PX;
+            Value { y, ..value }
+        };
+        Series {
+            values: series.values.into_iter().map(value).collect(),
+            marks: vec![Mark::Points, Mark::Intervals],
+            look: Some(Look { line_px: 1.4, marker_px: 3.8, ..look }),
+            ..series
+        }
+    };
+    let separators = Rule {
+        runs: (1..rows.len()).map(|row| [0.0, f64::MAX].map(|x| (x, -(row as f64 * row_px))).to_vec()).collect(),
+        colour: GREY,
+        width_px: 0.5,
+        ..Rule::default()
+    };
+    Plot {
+        x,
+        y: PlotAxis { names: rows.iter().enumerate().map(name).collect(), ..PlotAxis::new("", -height_px, 0.0) },
+        rules: vec![separators],
+        series: series.into_iter().enumerate().map(line).collect(),
+        height: Height::Px(height_px),
+        ..Plot::default()
+    }
 }

@@ -39,17 +39,13 @@ impl StudyReport<'_> {
                 .text(tables::reference_text(comparison))
         }));
         sections.extend([self.data(), self.reproduction()]);
+        let (answer_sentence, data, runs) = (self.sentence(), sentence(&facts.data), count(self.lanes()));
+        let (headways, drivers, profile) = (self.headways_in_words(), self.drivers(), &self.study.plan().profile.name);
         Page {
             title: "Parameterized against recorded scenarios".to_owned(),
             lead: format!(
-                "{} {} {} runs: every scenario as recorded (S) and parameterized (S'), from {}, against {} \
-                 driver models, judged by collision, TTC and BTN under profile {}.",
-                self.sentence(),
-                sentence(&facts.data),
-                count(self.lanes()),
-                self.headways_in_words(),
-                self.evaluation.scores.categories.first().map_or(0, |c| c.models.len()),
-                self.study.plan().profile.name
+                "{answer_sentence} {data} {runs} runs: every scenario as recorded (S) and parameterized (S'), from {headways}, \
+                 against {drivers} driver models, judged by collision, TTC and BTN under profile {profile}."
             ),
             synthetic: facts.synthetic,
             warnings,

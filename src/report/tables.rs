@@ -50,50 +50,49 @@ pub(super) fn failure_table(scores: &ScoreTable, published: bool) -> Table {
 
 /// F1 per parameterization, model and criterion, with its interval.
 pub(super) fn f1_scores(scores: &CategoryScores) -> Table {
-    per_variant(scores, scores.judged(), Some("S fails"), |s, variant| {
-        NumberText(same(scores, s, variant).map_or("-".to_owned(), |c| f1_text(f1(&c.counts), c.f1_interval)))
-    })
+    per_variant(scores, scores.judged(), Some("S fails"), |cell| f1_text(f1(&cell.counts), cell.f1_interval))
 }
 
 /// F1 in sample beside the paper's, which is in sample; without rows where the paper has none.
 pub(super) fn f1_beside_published(scores: &CategoryScores) -> Option<Table> {
     let variants: Vec<usize> =
         (1..scores.variants.len()).filter(|at| !scores.variants[*at].ends_with(CROSS_VALIDATED)).collect();
-    let theirs = |s: &ScoreCell, variant: usize| published_lvd_f1(&scores.variants[variant], s.model, s.criterion);
-    let table = per_variant(scores, variants, None, |s, variant| {
-        let own = same(scores, s, variant).and_then(|c| f1(&c.counts)).map_or("-".to_owned(), |f1| format!("{f1:.3}"));
-        NumberText(own + &theirs(s, variant).map_or(String::new(), |theirs| format!("\npaper {theirs:.3}")))
+    let table = per_variant(scores, variants, None, |cell| {
+        let theirs = published_lvd_f1(&scores.variants[cell.variant], cell.model, cell.criterion);
+        share(f1(&cell.counts)) + &theirs.map_or(String::new(), |theirs| format!("\npaper {theirs:.3}"))
     });
     (scores.category == Category::Lvd).then_some(table)
 }
 
 /// Recall and precision per parameterization, model and criterion.
 pub(super) fn share_table(scores: &CategoryScores) -> Table {
-    let share = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.3}"));
-    per_variant(scores, scores.judged(), None, |s, variant| {
-        let both = |c: &ScoreCell| format!("{} / {}", share(recall(&c.counts)), share(precision(&c.counts)));
-        NumberText(same(scores, s, variant).map_or("-".to_owned(), both))
+    per_variant(scores, scores.judged(), None, |cell| {
+        format!("{} / {}", share(recall(&cell.counts)), share(precision(&cell.counts)))
     })
 }
 
-/// A row per model and criterion, a column per parameterization, from the cells of S.
+fn share(value: Option<f64>) -> String {
+    value.map_or("-".to_owned(), |value| format!("{value:.3}"))
+}
+
+/// A row per model and criterion of the cells of S, a column per parameterization with the texts of its cells.
 fn per_variant(
     scores: &CategoryScores,
     variants: Vec<usize>,
     fails: Option<&'static str>,
-    text: impl Fn(&ScoreCell, usize) -> NumberText,
+    text: impl Fn(&ScoreCell) -> String,
 ) -> Table {
+    let same = |s: &ScoreCell, variant| scores.index(variant, s.model, s.criterion).map(|at| text(&scores.cells[at]));
     Table::of(scores.cells.iter().filter(|cell| cell.variant == 0))
         .column("model", |s| s.model.name())
         .column("criterion", |s| s.criterion.label())
         .columns(fails, |name| name, |s, _| s.counts.tp)
-        .columns(variants, |variant| short_name(&scores.variants[variant]).to_owned(), text)
+        .columns(
+            variants,
+            |variant| short_name(&scores.variants[variant]).to_owned(),
+            |s, variant| NumberText(same(s, variant).unwrap_or("-".to_owned())),
+        )
         .build()
-}
-
-/// The cell of a variant that corresponds to one of S.
-fn same<'a>(scores: &'a CategoryScores, s: &ScoreCell, variant: usize) -> Option<&'a ScoreCell> {
-    scores.index(variant, s.model, s.criterion).map(|at| &scores.cells[at])
 }
 
 fn f1_text(value: Option<f64>, interval: Option<ScoreInterval>) -> String {
@@ -248,12 +247,10 @@ pub(super) fn claim_records(results: &[ClaimResult], data: &str) -> Table {
 
 /// One line for the terminal, and the first differences.
 pub(super) fn reference_text(comparison: &ReferenceComparison) -> String {
+    let (lanes, differences) = (comparison.lanes, readable::count(comparison.differences.len()));
+    let [all, lanes, caps] = [lanes * Criterion::ALL.len() as u64, lanes, comparison.cap_differs].map(readable::count);
     let mut text = format!(
-        "f32 against the f64 reference: {} of {} verdicts differ ({} lanes; the cap differs in {})\n",
-        readable::count_of(comparison.differences.len()),
-        readable::count(comparison.lanes * Criterion::ALL.len() as u64),
-        readable::count(comparison.lanes),
-        readable::count(comparison.cap_differs)
+        "f32 against the f64 reference: {differences} of {all} verdicts differ ({lanes} lanes; the cap differs in {caps})\n"
     );
     for d in comparison.differences.iter().take(20) {
         let side = if d.failed_in_f32 { "fails in f32 only" } else { "fails in f64 only" };
@@ -277,19 +274,23 @@ pub(super) fn paragraph(words: &str) -> String {
     wrap(words, WIDTH) + "\n"
 }
 
+/// A paragraph, indented.
+pub(super) fn indented(words: &str) -> String {
+    format!("  {}\n", wrap(words, WIDTH - 2).replace('\n', "\n  "))
+}
+
 /// The text wrapped between words; a longer word stays whole.
 pub(crate) fn wrap(text: &str, width: usize) -> String {
-    let mut lines = vec![String::new()];
+    let (mut wrapped, mut column) = (String::new(), 0);
     for word in text.split(' ') {
-        let last = lines.len() - 1;
-        if !lines[last].is_empty() && lines[last].chars().count() + 1 + word.chars().count() > width {
-            lines.push(word.to_owned());
-        } else {
-            if !lines[last].is_empty() {
-                lines[last].push(' ');
-            }
-            lines[last].push_str(word);
-        }
+        let length = word.chars().count();
+        let (space, begin) = match column {
+            0 => ("", 0),
+            _ if column + 1 + length > width => ("\n", 0),
+            _ => (" ", column + 1),
+        };
+        wrapped.extend([space, word]);
+        column = begin + length;
     }
-    lines.join("\n")
+    wrapped
 }

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::plot::{Figure, Plot, PlotAxis, Rule};
 use super::tables::wrap;
-use lanesweep_support::readable::count_of;
+use lanesweep_support::readable::count;
 use lanesweep_support::table::WIDTH;
 use lanesweep_traffic::mining::{CategoryCount, counts_text};
 use lanesweep_traffic::trajectory::tracks::Understanding;
@@ -81,23 +81,25 @@ pub fn across(recording: &Recording) -> Figure {
         };
         let every = tracks.len().div_ceil(MAX_TRACKS).max(1);
         let of_class = |class: VehicleClass| tracks.iter().step_by(every).filter(move |track| track.class == class);
-        let rule = |runs: Vec<_>, name: &str, colour, width_px, dash| Rule {
+        let drawn = |class: VehicleClass| of_class(class).map(points).collect::<Vec<_>>();
+        let rules = [
+            (drawn(VehicleClass::Car), "cars", CAR, 0.7, ""),
+            (drawn(VehicleClass::Truck), "lorries", TRUCK, 0.7, ""),
+            (lines.collect(), "lane lines", LINE, 1.6, "8,5"),
+        ];
+        let rules = rules.into_iter().filter(|(runs, ..)| !runs.is_empty());
+        let rules = rules.map(|(runs, name, colour, width_px, dash)| Rule {
             runs,
             name: name.to_owned(),
             colour,
             width_px,
             dash,
             ..Rule::default()
-        };
-        let mut rules = vec![
-            rule(of_class(VehicleClass::Car).map(points).collect(), "cars", CAR, 0.7, ""),
-            rule(of_class(VehicleClass::Truck).map(points).collect(), "lorries", TRUCK, 0.7, ""),
-            rule(lines.collect(), "lane lines", LINE, 1.6, "8,5"),
-        ];
-        rules.retain(|rule| !rule.runs.is_empty());
+        });
+        let rules: Vec<Rule> = rules.collect();
         let (low, high) = range(&mut rules.iter().flat_map(|rule| rule.runs.iter().flatten().map(|point| point.1)));
         plots.push(Plot {
-            heading: format!("carriageway {}, {} tracks", carriageway.name, count_of(tracks.len())),
+            heading: format!("carriageway {}, {} tracks", carriageway.name, count(tracks.len())),
             x: PlotAxis::new("position along the road, m", 0.0, (end - begin).max(1.0)),
             y: PlotAxis::new("position from the left edge of the leftmost lane, m", low, high),
             rules,

@@ -1,7 +1,5 @@
 //! A verification as text for the terminal.
 
-use std::fmt::Write;
-
 use serde::Serialize;
 
 use crate::lanes::outcome_record;
@@ -34,12 +32,12 @@ pub fn comparison(comparison: &Comparison, dt_s: f64) -> String {
         text += "* outside 5–95 %: these lanes hardly test this criterion\n";
     }
     if comparison.modes_differing > 0 {
-        let _ = writeln!(text, "{} verdicts differ if only verdicts are requested", count(comparison.modes_differing));
+        text += &format!("{} verdicts differ if only verdicts are requested\n", count(comparison.modes_differing));
     }
     for lane in &comparison.worst {
-        let _ = writeln!(text, "  {} differs in {}", lane.key, lane.names().join(", "));
+        text += &format!("  {} differs in {}\n", lane.key, lane.names().join(", "));
     }
-    comparison.worst.first().map_or(text.clone(), |worst| text + &lane(worst, dt_s))
+    text + &comparison.worst.first().map_or(String::new(), |worst| lane(worst, dt_s))
 }
 
 /// The same as [`comparison`], as JSON.

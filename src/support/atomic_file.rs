@@ -12,7 +12,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::{NamedTempFile, TempPath};
 
-use crate::input_file::{claim_output, sha256};
+use crate::input_file::claim_output;
 use crate::{Error, Place, Result};
 
 /// Hidden names are `.lanesweep-<file name>-XXXXXX.part`.
@@ -96,12 +96,9 @@ fn target_of(hidden: &str) -> Option<&str> {
 /// The prefix of a hidden name.
 fn prefix(target: &Path) -> OsString {
     let mut prefix = OsString::from(PREFIX);
-    match target.file_name() {
-        Some(name) if name.len() <= LONGEST => {
-            prefix.push(name);
-            prefix.push("-");
-        }
-        _ => {}
+    if let Some(name) = target.file_name().filter(|name| name.len() <= LONGEST) {
+        prefix.push(name);
+        prefix.push("-");
     }
     prefix
 }
@@ -141,8 +138,10 @@ pub struct AtomicFile {
 
 /// A complete file under its hidden name; dropping it before [`StagedFile::publish`] removes it.
 pub struct StagedFile {
-    target: PathBuf,
-    path: TempPath,
+    /// The final path.
+    pub(super) target: PathBuf,
+    /// The hidden one.
+    pub(super) path: TempPath,
     /// Kept open for its lock.
     file: Option<File>,
     live: Live,
@@ -228,11 +227,8 @@ fn resolve(target: &Path) -> Result<PathBuf> {
     let Ok(kind) = std::fs::metadata(target) else { return Ok(target.to_path_buf()) };
     if !kind.is_file() {
         let what = if kind.is_dir() { "a folder" } else { "a device or pipe" };
-        return Err(Error::usage(
-            Place::file(target),
-            format!("this is {what}, and a result is written to a file of its own"),
-            "give the path of a file",
-        ));
+        let problem = format!("this is {what}, and a result is written to a file of its own");
+        return Err(Error::usage(Place::file(target), problem, "give the path of a file"));
     }
     std::fs::canonicalize(target).map_err(|source| Error::io(target, "write", source))
 }
@@ -274,19 +270,6 @@ impl StagedFile {
     pub(crate) fn closed(mut self) -> Self {
         self.file = None;
         self
-    }
-
-    /// SHA-256 of the content, in hexadecimal.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if it cannot be read back.
-    pub(super) fn sha256(&self) -> Result<String> {
-        sha256(&self.path)
-    }
-
-    /// The final path.
-    pub(super) fn target(&self) -> &Path {
-        &self.target
     }
 }
 

@@ -115,23 +115,14 @@ fn path_name(path: &Path) -> String {
 
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut parts = Vec::new();
-        if let Some(file) = &self.file {
-            parts.push(path_name(file));
-        }
-        if let Some(row) = self.row {
-            parts.push(format!("line {row}"));
-        }
-        if let Some(column) = &self.column {
-            parts.push(format!("column `{}`", shown_in_line(column)));
-        }
-        if let Some(item) = &self.item {
-            parts.push(shown_in_line(item));
-        }
-        if let Some(option) = self.option {
-            parts.push(self::option(option));
-        }
-        f.write_str(&parts.join(", "))
+        let parts = [
+            self.file.as_deref().map(path_name),
+            self.row.map(|row| format!("line {row}")),
+            self.column.as_ref().map(|column| format!("column `{}`", shown_in_line(column))),
+            self.item.as_deref().map(shown_in_line),
+            self.option.map(option),
+        ];
+        f.write_str(&parts.into_iter().flatten().collect::<Vec<_>>().join(", "))
     }
 }
 

@@ -113,11 +113,8 @@ fn open_own(path: &Path) -> Result<File> {
         return Err(Error::input(Place::file(path), problem, "give the path of a file"));
     }
     if !kind.is_file() {
-        return Err(Error::input(
-            Place::file(path),
-            "this is a pipe, a device or a socket; expected a regular file",
-            "write its content to a file first and name that one",
-        ));
+        let problem = "this is a pipe, a device or a socket; expected a regular file";
+        return Err(Error::input(Place::file(path), problem, "write its content to a file first and name that one"));
     }
     File::open(path).map_err(io)
 }
@@ -222,11 +219,8 @@ pub fn read(path: &Path, largest: u64) -> Result<Vec<u8>> {
     // The reported size may be wrong or change, so the bytes read are limited.
     open(path)?.take(largest + 1).read_to_end(&mut content).map_err(|e| Error::io(path, "read", e))?;
     if content.len() as u64 > largest {
-        return Err(Error::input(
-            Place::file(path),
-            format!("more than {} MiB, larger than any file of this kind", largest >> 20),
-            "check that this is the right file",
-        ));
+        let problem = format!("more than {} MiB, larger than any file of this kind", largest >> 20);
+        return Err(Error::input(Place::file(path), problem, "check that this is the right file"));
     }
     Ok(content)
 }
@@ -266,10 +260,14 @@ fn ends(file: &mut File) -> std::io::Result<(Vec<u8>, Vec<u8>)> {
 /// As [`read`]; [`Error::Input`] for text that is not UTF-8.
 pub fn read_text(path: &Path, largest: u64) -> Result<String> {
     String::from_utf8(read(path, largest)?).map_err(|e| {
-        let at = e.utf8_error().valid_up_to();
-        let row = 1 + e.as_bytes()[..at].iter().filter(|&&b| b == b'\n').count() as u64;
+        let row = row_at(e.as_bytes(), e.utf8_error().valid_up_to());
         Error::input(Place::file(path).row(row), "not UTF-8 text", "save the file as UTF-8")
     })
+}
+
+/// The line of a byte of a text, from 1.
+pub fn row_at(text: &[u8], at: usize) -> u64 {
+    1 + text.iter().take(at).filter(|byte| **byte == b'\n').count() as u64
 }
 
 /// SHA-256 of a regular file of any size, in hexadecimal; read in pieces. It is that of the bytes that the command read.
@@ -298,8 +296,7 @@ pub fn parse_toml<T: DeserializeOwned>(text: &str, place: &Place, help: &str) ->
     toml::from_str(text).map_err(|e| {
         let mut place = place.clone();
         if let Some(span) = e.span() {
-            let before = text.bytes().take(span.start);
-            place.row = Some(1 + before.filter(|&byte| byte == b'\n').count() as u64);
+            place.row = Some(row_at(text.as_bytes(), span.start));
             if place.item.is_none() {
                 place.item = key_before(text, span.start).map(|key| format!("`{key}`"));
             }

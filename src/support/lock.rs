@@ -106,11 +106,8 @@ fn refuse_foreign(path: &Path, file: &mut File) -> Result<()> {
     file.take(MAX_LOCK_BYTES + 1).read_to_end(&mut text).map_err(|source| Error::io(path, "read", source))?;
     if text.len() as u64 > MAX_LOCK_BYTES || !text.trim_ascii().iter().all(u8::is_ascii_digit) {
         let problem = "it would be overwritten, and it is no lock file of lanesweep";
-        return Err(Error::usage(
-            Place::file(path),
-            problem,
-            format!("move it away, or give another {}", option("out")),
-        ));
+        let help = format!("move it away, or give another {}", option("out"));
+        return Err(Error::usage(Place::file(path), problem, help));
     }
     Ok(())
 }

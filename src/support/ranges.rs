@@ -121,6 +121,19 @@ pub fn refuse_repeats<K: Eq + Hash, S: Display>(
     Ok(())
 }
 
+/// Declares tables of the configuration, as [`settings!`](crate::settings); each is read, written, and in the schema.
+#[macro_export]
+macro_rules! config_tables {
+    ($($(#[$about:meta])* $vis:vis struct $table:ident { $($fields:tt)* })*) => {
+        $crate::settings! {$(
+            #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+            #[serde(deny_unknown_fields, default)]
+            $(#[$about])*
+            $vis struct $table { $($fields)* }
+        )*}
+    };
+}
+
 /// Declares tables of settings, with the default of each field: `pub window_s: f64 = 1.0,`.
 #[macro_export]
 macro_rules! settings {

@@ -4,24 +4,14 @@
 /// Significant digits of a number for people.
 const DIGITS: usize = 4;
 
-/// Formats a count: `1,234,567`.
-pub fn count(count: impl Into<u64>) -> String {
-    grouped(&count.into().to_string())
-}
-
-/// Like [`count`], for a length in memory.
-pub fn count_of(length: usize) -> String {
-    grouped(&length.to_string())
-}
-
-/// Like [`count`], for a signed number.
-pub(super) fn whole(number: i64) -> String {
+/// Formats a whole number: `1,234,567`.
+pub fn count(number: impl TryInto<i128> + ToString) -> String {
     grouped(&number.to_string())
 }
 
 /// Formats a count with its noun: `1 scenario`, `2 scenarios`.
 pub fn counted(length: usize, noun: &str) -> String {
-    format!("{} {noun}{}", count_of(length), if length == 1 { "" } else { "s" })
+    format!("{} {noun}{}", count(length), if length == 1 { "" } else { "s" })
 }
 
 /// Formats a quantity with at most four significant digits and no trailing zeros: `0.45`, `36`, `1,235`, `3.2e-9`, `∞`.

@@ -255,7 +255,7 @@ impl Results<'_> {
         let mut file = AtomicFile::create_inside(&path)?;
         produce(&mut file).map_err(|e| Error::io(&path, "write", e))?;
         let file = file.stage()?.closed();
-        self.sha256.insert(name.to_owned(), file.sha256()?);
+        self.sha256.insert(name.to_owned(), input_file::sha256(&file.path)?);
         self.staged.push((name.to_owned(), file));
         Ok(())
     }
@@ -278,13 +278,13 @@ impl Results<'_> {
 
     /// Adds a complete file of this folder.
     pub fn add_staged(&mut self, file: StagedFile) {
-        self.staged.push((file_name(file.target()), file.closed()));
+        self.staged.push((file_name(&file.target), file.closed()));
     }
 
     /// Adds a complete file that a user named, in this folder or elsewhere.
     pub fn join(&mut self, file: StagedFile) {
-        if folder_of(file.target()).canonicalize().ok() == self.folder.dir.canonicalize().ok() {
-            self.named.insert(file_name(file.target()));
+        if folder_of(&file.target).canonicalize().ok() == self.folder.dir.canonicalize().ok() {
+            self.named.insert(file_name(&file.target));
             self.add_staged(file);
         } else {
             self.elsewhere.push(file);
@@ -328,7 +328,7 @@ impl Results<'_> {
                 let problem = "this run would replace it, and no earlier run wrote it";
                 return Err(Error::usage(Place::file(dir.join(name)), problem, "choose another name or folder"));
             }
-            let sha256 = self.sha256.remove(name).map_or_else(|| file.sha256(), Ok)?;
+            let sha256 = self.sha256.remove(name).map_or_else(|| input_file::sha256(&file.path), Ok)?;
             list.files.insert((name.clone(), sha256));
         }
         let both = former.files.union(&list.files).cloned().collect();

@@ -62,7 +62,7 @@ impl Source {
         match self {
             Source::Scenarios { .. } => 0,
             Source::Recordings { path, preset } => {
-                Inputs::of(path, preset.as_deref()).map_or(0, |inputs| inputs.count() as u64)
+                Inputs::of(path, preset.as_deref()).map_or(0, |inputs| inputs.files.len() as u64)
             }
             Source::Generated(options) => options.recordings as u64,
         }

@@ -101,12 +101,12 @@ fn a_step_that_no_vehicle_makes_gives_two_tracks_and_is_said_but_a_lane_change_i
     assert!(!says(&understood(&table).unwrap(), "no vehicle makes"));
     for by_m in [8.0, -60.0] {
         let mut table = with_speeds();
-        let tracks = read(&table).unwrap().loaded.recording.tracks.len();
+        let tracks = read(&table).unwrap().recording.tracks.len();
         let rows = rows_by_vehicle(&table);
         let (vehicle, own) = rows.iter().find(|(_, rows)| rows.len() > 60).unwrap();
         table.shift(&own[30..], "x", by_m);
         let read = read(&table).unwrap();
-        assert_eq!(read.loaded.recording.tracks.len(), tracks + 1, "{by_m}");
+        assert_eq!(read.recording.tracks.len(), tracks + 1, "{by_m}");
         assert!(says(&read.understanding, "1 step(s) that no vehicle makes"), "{by_m}");
         let said = says(&read.understanding, &format!("split tracks, the first is that of vehicle {vehicle} "));
         assert!(said, "{by_m}: {:?}", read.understanding.findings);
@@ -116,7 +116,7 @@ fn a_step_that_no_vehicle_makes_gives_two_tracks_and_is_said_but_a_lane_change_i
 #[test]
 fn a_number_used_again_within_a_gap_that_is_filled_is_another_vehicle_with_its_own_size_and_class() {
     let mut table = with_speeds();
-    let all = read(&table).unwrap().loaded.recording.tracks.len();
+    let all = read(&table).unwrap().recording.tracks.len();
     let class = table.at("class");
     let rows = rows_by_vehicle(&table);
     let follows = |(a, b): &(&Vec<usize>, &Vec<usize>)| {
@@ -132,12 +132,12 @@ fn a_number_used_again_within_a_gap_that_is_filled_is_another_vehicle_with_its_o
     let key = table.rows[first[0]][0].clone();
     second.iter().for_each(|at| table.rows[*at][0].clone_from(&key));
     let read = read(&table).unwrap();
-    let tracks = &read.loaded.recording.tracks;
+    let tracks = &read.recording.tracks;
     assert!(says(&read.understanding, "1 step(s) that no vehicle makes") && tracks.len() == all);
     let facts = |track: &Track| (track.length_m, track.class);
-    let of_first = read.loaded.recording.track(key.parse().unwrap()).map(facts);
+    let of_first = read.recording.track(key.parse().unwrap()).map(facts);
     assert_eq!([of_first, tracks.last().map(facts)], vehicles);
-    let mined = mine(&read.loaded.recording, &MiningOptions::default());
+    let mined = mine(&read.recording, &MiningOptions::default());
     assert!(mined.scenarios.iter().filter(|found| found.kept).all(|found| found.gap0 > Some(0.0)));
 }
 

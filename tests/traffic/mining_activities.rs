@@ -100,12 +100,13 @@ fn the_search_finds_the_golden_intervals() {
             .map(|k| {
                 let t = k as f64 * STEP_S;
                 let row = row_at(target, t);
-                Tags::default()
-                    .with(Tags::DECELERATES, row[1] == "d")
-                    .with(Tags::CHANGES_IN, row[2] == "li" || row[2] == "ri")
-                    .with(Tags::CHANGES_OUT, row[2] == "lo" || row[2] == "ro")
-                    .with(Tags::LEADER, row[3] == "y")
-                    .with(Tags::EGO_KEEPS_LANE, ego.is_none_or(|rows| row_at(rows, t)[2] == "fl"))
+                Tags {
+                    decelerates: row[1] == "d",
+                    changes_in: row[2] == "li" || row[2] == "ri",
+                    changes_out: row[2] == "lo" || row[2] == "ro",
+                    leader: row[3] == "y",
+                    ego_keeps_lane: ego.is_none_or(|rows| row_at(rows, t)[2] == "fl"),
+                }
             })
             .collect();
         let (items, pause): (&[tags::Item<Tags>], usize) = match case["kind"].as_str().unwrap() {

@@ -38,7 +38,7 @@ fn mined(table: &Plain, smoothing_s: Option<f64>) -> (u64, Vec<String>) {
     let read = read_by(table, &|preset| preset.smoothing_s = smoothing_s).unwrap();
     let graves: Vec<_> = read.understanding.findings.iter().filter(|finding| finding.is_grave).collect();
     assert!(graves.is_empty(), "{graves:?}");
-    let (_, mut found) = mine_loaded(&read.loaded, &MiningOptions::default(), Implausible::Refused);
+    let (_, mut found) = mine_loaded(&read, &MiningOptions::default(), Implausible::Refused);
     found.notes.retain(|note| note.contains("noise can decide"));
     (count(&found.scenarios, Category::Lvd).kept, found.notes)
 }

@@ -9,7 +9,7 @@ use lanesweep::traffic::Source;
 use lanesweep::traffic::mining::mine;
 use lanesweep::traffic::trajectory::generator::generate_one;
 use lanesweep::traffic::trajectory::tracks::{
-    self, HeadingOrigin, LoadedTracks, Preset, Reference, RoadSource, Role, Side, TrackFile, Understanding,
+    self, HeadingOrigin, Preset, Reference, RoadSource, Role, Side, TrackFile, Understanding,
 };
 use lanesweep::traffic::trajectory::{Carriageway, Inputs, Loaded, NO_LANE, Track, VehicleClass, highd};
 
@@ -45,7 +45,7 @@ pub fn load_collection(path: &Path) -> Collection {
 }
 
 fn load_exid(dir: &Path) -> Loaded {
-    let detected = Inputs::of(dir, None).unwrap().preset().map(|preset| preset.name.clone());
+    let detected = Inputs::of(dir, None).unwrap().preset.map(|preset| preset.name);
     assert_eq!(detected.as_deref(), Some("exid"));
     load(dir).unwrap().remove(0)
 }
@@ -140,7 +140,7 @@ pub fn understood(table: &Plain) -> lanesweep::Result<Understanding> {
     read(table).map(|read| read.understanding)
 }
 
-pub fn read(table: &Plain) -> lanesweep::Result<LoadedTracks> {
+pub fn read(table: &Plain) -> lanesweep::Result<Loaded> {
     read_by(table, &|_| ())
 }
 
@@ -153,7 +153,7 @@ pub fn says(about: &Understanding, words: &str) -> bool {
 }
 
 /// A table under the generic preset, changed.
-pub fn read_by(table: &Plain, change: &dyn Fn(&mut Preset)) -> lanesweep::Result<LoadedTracks> {
+pub fn read_by(table: &Plain, change: &dyn Fn(&mut Preset)) -> lanesweep::Result<Loaded> {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("own.csv");
     std::fs::write(&path, table.text()).unwrap();
@@ -369,10 +369,11 @@ fn missing_values_gaps_and_repeated_rows_are_said() {
     // A hole of two seconds: two tracks.
     let hole: Vec<usize> = own[10..20].to_vec();
     table.rows = table.rows.into_iter().enumerate().filter(|(at, _)| !hole.contains(at)).map(|(_, row)| row).collect();
-    let LoadedTracks { loaded, understanding: about } = read(&table).unwrap();
+    let loaded = read(&table).unwrap();
+    let about = &loaded.understanding;
     assert!(!loaded.vehicle_names.is_empty());
     for words in ["1 rows have no position", "2 rows repeat", "1 of these rows name another", "were interpolated"] {
-        assert!(says(&about, words), "{words}: {:?}", about.findings);
+        assert!(says(about, words), "{words}: {:?}", about.findings);
     }
     // What is no number is refused with its place.
     let mut bad = table.clone();
@@ -468,7 +469,7 @@ fn in_format_of(preset: &Preset, recording: &Recording, stride: usize, mistake: 
         format!("{:.6}", mistake(role, si, track) / factor)
     };
     let columns: Vec<(Role, &str)> =
-        preset.columns.iter().map(|(role, column)| (*role, column.names()[0].as_str())).collect();
+        preset.columns.iter().map(|(role, column)| (*role, column.names[0].as_str())).collect();
     let mut text = columns.iter().map(|(_, name)| *name).collect::<Vec<_>>().join(",") + "\n";
     for track in &recording.tracks {
         for k in (0..track.len()).filter(|k| (track.first_frame + *k as i64) % stride as i64 == 0) {
@@ -529,7 +530,7 @@ fn every_preset_reads_its_own_format_and_finds_mistakes_in_it() {
             match is_parquet {
                 #[cfg(feature = "parquet")]
                 true => {
-                    let columns = columns(&text, &[preset.columns[&Role::Vehicle].names()[0].as_str()]);
+                    let columns = columns(&text, &[preset.columns[&Role::Vehicle].names[0].as_str()]);
                     crate::common::made::write(&path, columns, parquet::basic::Compression::SNAPPY);
                 }
                 _ => std::fs::write(&path, text).unwrap(),

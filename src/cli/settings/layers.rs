@@ -8,8 +8,9 @@ use toml::de::{DeTable, DeValue};
 
 use super::Settings;
 use super::keys::{Key, KeyKind, from_toml, from_word, keys_in_order};
+use lanesweep_support::input_file::{self, row_at};
 use lanesweep_support::plain_text::{cut, nearest};
-use lanesweep_support::{Error, Place, Result, input_file, option};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Variable that names the configuration file if `--config` names none.
 pub(crate) const FILE_VARIABLE: &str = "LANESWEEP_CONFIG";
@@ -140,7 +141,8 @@ impl Layers {
     pub(crate) fn read_file(&mut self, path: &Path) -> Result<()> {
         let text = input_file::read_text(path, input_file::MAX_SETTINGS_BYTES)?;
         let table = DeTable::parse(&text).map_err(|e| {
-            let place = e.span().map_or(Place::file(path), |span| Place::file(path).row(row_at(&text, span.start)));
+            let place =
+                e.span().map_or(Place::file(path), |span| Place::file(path).row(row_at(text.as_bytes(), span.start)));
             Error::usage(place, e.message().to_owned(), "`lanesweep config init -` prints a file that works")
         })?;
         self.take(table.get_ref(), "", (path, &text))
@@ -149,7 +151,7 @@ impl Layers {
     /// Takes the values of a table of a file; `prefix` is its name with a dot.
     fn take(&mut self, table: &DeTable, prefix: &str, (path, text): (&Path, &str)) -> Result<()> {
         for (name, value) in table {
-            let row = row_at(text, name.span().start);
+            let row = row_at(text.as_bytes(), name.span().start);
             let (name, value) = (format!("{prefix}{}", name.get_ref()), value.get_ref());
             let place = || Place::file(path).row(row).of(format!("`{}`", cut(&name)));
             let below = format!("{name}.");
@@ -227,11 +229,6 @@ impl Layers {
         settings.mining.validate()?;
         Ok(settings)
     }
-}
-
-/// The line of a byte of a text, from 1.
-fn row_at(text: &str, at: usize) -> u64 {
-    1 + text.bytes().take(at).filter(|&byte| byte == b'\n').count() as u64
 }
 
 /// Table and last word of a name.

@@ -10,7 +10,7 @@ use lanesweep_model::driver::Bound;
 use lanesweep_model::scenario::parameterization::{ParameterizationOptions, SvdLateral};
 use lanesweep_run::score::ScoreOptions;
 use lanesweep_stats::density::{BandwidthRule, FitOptions};
-use lanesweep_support::settings;
+use lanesweep_support::config_tables;
 use lanesweep_traffic::mining::MiningOptions;
 use lanesweep_traffic::trajectory::generator::GeneratorOptions;
 
@@ -46,10 +46,8 @@ pub(crate) struct Settings {
     pub verify: VerifySettings,
 }
 
-settings! {
+config_tables! {
     /// Options of every verb.
-    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-    #[serde(deny_unknown_fields, default)]
     pub(crate) struct RunSettings {
         /// Threads; results do not depend on it. Without it: all cores.
         #[serde(skip_serializing_if = "Option::is_none")]
@@ -80,12 +78,8 @@ settings! {
         #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1e9))]
         pub stop_after_s: Option<f64> = None,
     }
-}
 
-settings! {
     /// `lanesweep study`.
-    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-    #[serde(deny_unknown_fields, default)]
     pub(crate) struct StudySettings {
         /// Compute in binary64 on the CPU, not in the f32 lane arithmetic.
         pub reference: bool = false,
@@ -97,24 +91,8 @@ settings! {
         #[schemars(range(min = 1, max = 100))]
         pub folds: usize = 5,
     }
-}
 
-/// When a run in one piece leaves its plan.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub(crate) enum KeepPlan {
-    /// Up to 256 MiB, about 135,000 scenarios.
-    Auto,
-    /// However large.
-    Always,
-    /// Never.
-    Never,
-}
-
-settings! {
     /// `lanesweep fit`.
-    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-    #[serde(deny_unknown_fields, default)]
     pub(crate) struct FitSettings {
         /// Search interval of the bandwidth.
         pub bandwidth_rule: BandwidthRule = FitOptions::default().rule,
@@ -127,12 +105,8 @@ settings! {
         #[schemars(range(min = 1, max = 1_000_000_000))]
         pub valid_draws: u64 = FitOptions::default().valid_draws,
     }
-}
 
-settings! {
     /// `lanesweep sample`.
-    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-    #[serde(deny_unknown_fields, default)]
     pub(crate) struct SampleSettings {
         /// Crude, importance, or the cheaper one. Importance sampling searches the failures, then draws
         /// around them; `auto` chooses for each model and headway, and is `mc` without a half-width.
@@ -176,6 +150,35 @@ settings! {
         #[schemars(extend("x-flag" = "seed", "x-verbs" = ["sample"], "x-heading" = RUN))]
         pub seed: u64 = 157,
     }
+
+    /// `lanesweep map`.
+    pub(crate) struct MapSettings {
+        /// Compute in binary64 on the CPU, not in the f32 lane arithmetic.
+        pub reference: bool = false,
+        /// Only panels in which the ego is faster than the other vehicle; not of presets.
+        pub closing: bool = false,
+        /// Start each model at its following distance in the JRC's simulator, not gap_m or thw_s; not of presets.
+        pub native_gap: bool = false,
+    }
+
+    /// `lanesweep verify`.
+    pub(crate) struct VerifySettings {
+        /// Units of 12 lanes per model, threshold and category.
+        #[schemars(range(min = 1, max = 100_000))]
+        pub threshold_units: u64 = 64,
+    }
+}
+
+/// When a run in one piece leaves its plan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum KeepPlan {
+    /// Up to 256 MiB, about 135,000 scenarios.
+    Auto,
+    /// However large.
+    Always,
+    /// Never.
+    Never,
 }
 
 /// What importance sampling rests on.
@@ -195,29 +198,4 @@ pub(crate) enum EstimatorKind {
     Auto,
     Mc,
     Is,
-}
-
-settings! {
-    /// `lanesweep map`.
-    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-    #[serde(deny_unknown_fields, default)]
-    pub(crate) struct MapSettings {
-        /// Compute in binary64 on the CPU, not in the f32 lane arithmetic.
-        pub reference: bool = false,
-        /// Only panels in which the ego is faster than the other vehicle; not of presets.
-        pub closing: bool = false,
-        /// Start each model at its following distance in the JRC's simulator, not gap_m or thw_s; not of presets.
-        pub native_gap: bool = false,
-    }
-}
-
-settings! {
-    /// `lanesweep verify`.
-    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-    #[serde(deny_unknown_fields, default)]
-    pub(crate) struct VerifySettings {
-        /// Units of 12 lanes per model, threshold and category.
-        #[schemars(range(min = 1, max = 100_000))]
-        pub threshold_units: u64 = 64,
-    }
 }

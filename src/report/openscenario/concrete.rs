@@ -58,8 +58,8 @@ pub struct Concrete {
     pub vehicles: Vec<PlayedVehicle>,
     /// The concrete parameters: names with units, values.
     pub parameters: Vec<(String, f64)>,
-    /// Properties of the lane and its outcome, in order.
-    pub properties: Vec<(String, String)>,
+    /// Properties of the lane and its outcome, in order, its key first.
+    pub properties: Vec<(&'static str, String)>,
     /// Whether the data are synthetic.
     pub is_synthetic: bool,
 }
@@ -98,10 +98,9 @@ impl Concrete {
             let count = vehicle.path.len();
             if !(2..=MAX_VERTICES).contains(&count) {
                 let problem = format!("the path of {} has {count} vertices", vehicle.name);
-                let help = format!(
-                    "2 to {MAX_VERTICES} can be written: use a longer time step or a shorter {}",
-                    option("duration")
-                );
+                let duration = option("duration");
+                let help =
+                    format!("2 to {MAX_VERTICES} can be written: use a longer time step or a shorter {duration}");
                 return Err(Error::input(place(), problem, help));
             }
             let is_finite = |v: &Vertex| v.time_s.is_finite() && v.x_m.is_finite() && v.y_m.is_finite();

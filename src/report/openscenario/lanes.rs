@@ -6,13 +6,13 @@
 
 use super::concrete::{Concrete, EgoMotion, PlayedVehicle, paths};
 use crate::records::smallest_gap_m;
-use lanesweep_engine::{EndReason, LaneCase, LaneKey, LaneOther, LanePlan, LaneRunner, NO_STEP, Trace};
+use lanesweep_engine::{EndReason, LaneCase, LaneKey, LanePlan, LaneRunner, NO_STEP, Trace};
 use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::NEVER;
 use lanesweep_model::profile::{CutOutTarget, Profile};
 use lanesweep_model::scalar::Real;
 use lanesweep_model::scenario::parameterization::{Sizes, VehicleSize};
-use lanesweep_model::scenario::{Category, LATERAL_SAMPLED, Motion, SPEED_SAMPLED, Scenario, Side, Tables};
+use lanesweep_model::scenario::{Category, LATERAL_SAMPLED, SPEED_SAMPLED, Scenario, Side, Tables};
 use lanesweep_run::reopen::{Reopened, TracedCase};
 use lanesweep_support::{Error, Place, Result, option};
 
@@ -106,10 +106,6 @@ fn lanes<R: Real>(
             }
             _ => Vec::new(),
         };
-        let wide = match plan.generator() {
-            Some(_) => widened(&case),
-            None => plan.case(key.block, key.unit, key.variant),
-        };
         let sizes = reopened.density().map(|density| density.sizes).or_else(|| scenario.map(Sizes::of));
         are_lengths_known &= sizes.is_some();
         let facts = LaneFacts {
@@ -122,37 +118,20 @@ fn lanes<R: Real>(
             is_synthetic,
             drawn,
         };
-        found.push(concrete(&runner.trace(key), (&case, &tables), &wide, &facts, options)?);
+        let (trace, own): (_, (_, &Tables<R>)) = (runner.trace(key), (&case, &tables));
+        found.push(match plan.generator() {
+            Some(_) => concrete(&trace, own, &case, &facts, options)?,
+            None => concrete(&trace, own, &plan.case(key.block, key.unit, key.variant), &facts, options)?,
+        });
     }
     Ok((found, are_lengths_known))
 }
 
-/// The same case in f64.
-fn widened<R: Real>(case: &LaneCase<R>) -> LaneCase<f64> {
-    LaneCase {
-        others: case.others.map(|o| LaneOther {
-            motion: Motion::default(),
-            half_lengths: o.half_lengths.to_f64(),
-            half_widths: o.half_widths.to_f64(),
-            gap_offset: o.gap_offset.to_f64(),
-            present_from: o.present_from,
-            present_until: o.present_until,
-            attend_from: o.attend_from,
-            used: o.used,
-            judged: o.judged,
-        }),
-        ego_speed: case.ego_speed.to_f64(),
-        ego_width: case.ego_width.to_f64(),
-        lane_width: case.lane_width.to_f64(),
-        horizon: case.horizon,
-        pair: case.pair,
-    }
-}
-
-fn concrete<R: Real>(
+/// `wide` is the case before it was rounded to the arithmetic of the lane, if that is known.
+fn concrete<R: Real, W: Real>(
     trace: &Trace,
     (case, tables): (&LaneCase<R>, &Tables<R>),
-    wide: &LaneCase<f64>,
+    wide: &LaneCase<W>,
     facts: &LaneFacts,
     options: &PlayOptions,
 ) -> Result<Concrete> {
@@ -195,7 +174,7 @@ fn concrete<R: Real>(
         lane_width_m: options
             .lane_width_m
             .or(scenario.map(|s| s.lane_width))
-            .unwrap_or(wide.lane_width)
+            .unwrap_or(wide.lane_width.to_f64())
             .clamp(1.0, 20.0),
         vehicles,
         parameters: parameters(trace, wide, facts),
@@ -205,7 +184,7 @@ fn concrete<R: Real>(
 }
 
 /// The case's parameters by name; those of a sampled point by the names of its density.
-fn parameters(trace: &Trace, case: &LaneCase<f64>, facts: &LaneFacts) -> Vec<(String, f64)> {
+fn parameters<W: Real>(trace: &Trace, case: &LaneCase<W>, facts: &LaneFacts) -> Vec<(String, f64)> {
     // Remove the rounding error of a product with the time step if the decimal gives the same product; else keep every
     // digit.
     let decimal = |value: f64| {
@@ -220,13 +199,15 @@ fn parameters(trace: &Trace, case: &LaneCase<f64>, facts: &LaneFacts) -> Vec<(St
     ];
     let motion = &case.others[0].motion;
     if facts.drawn.is_empty() {
-        if motion.kind & SPEED_SAMPLED == 0 && motion.speed_per_step != 0.0 {
-            list.push(("other_acceleration_mps2", decimal(motion.speed_per_step / trace.dt_s)));
-            list.push(("end_speed_mps", decimal(motion.speed_end)));
+        let [speed_per_step, lateral_per_step] = [motion.speed_per_step, motion.lateral_per_step].map(W::to_f64);
+        if motion.kind & SPEED_SAMPLED == 0 && speed_per_step != 0.0 {
+            list.push(("other_acceleration_mps2", decimal(speed_per_step / trace.dt_s)));
+            list.push(("end_speed_mps", decimal(motion.speed_end.to_f64())));
         }
-        if motion.kind & LATERAL_SAMPLED == 0 && motion.lateral_per_step != 0.0 {
-            list.push(("lateral_speed_mps", decimal(motion.lateral_per_step.abs() / trace.dt_s)));
-            list.push(("lateral_distance_m", decimal((motion.lateral_end - motion.lateral_initial).abs())));
+        if motion.kind & LATERAL_SAMPLED == 0 && lateral_per_step != 0.0 {
+            let distance_m = motion.lateral_end.to_f64() - motion.lateral_initial.to_f64();
+            list.push(("lateral_speed_mps", decimal(lateral_per_step.abs() / trace.dt_s)));
+            list.push(("lateral_distance_m", decimal(distance_m.abs())));
         }
     }
     if trace.vehicles == 2 {
@@ -239,7 +220,7 @@ fn parameters(trace: &Trace, case: &LaneCase<f64>, facts: &LaneFacts) -> Vec<(St
 }
 
 /// Facts about the lane and its end. Times in s; empty if the event did not happen.
-fn properties(trace: &Trace, facts: &LaneFacts, options: &PlayOptions) -> Vec<(String, String)> {
+fn properties(trace: &Trace, facts: &LaneFacts, options: &PlayOptions) -> Vec<(&'static str, String)> {
     let outcome = &trace.outcome;
     let time = |step: u32| if step == NO_STEP { String::new() } else { trace.time_s(step).to_string() };
     let value = |v: f64| v.to_string();
@@ -256,7 +237,7 @@ fn properties(trace: &Trace, facts: &LaneFacts, options: &PlayOptions) -> Vec<(S
         EgoMotion::Model => "model",
         EgoMotion::External => "external",
     };
-    let list = [
+    vec![
         ("lane", facts.key.clone()),
         ("model", trace.model.name().to_owned()),
         ("profile", facts.profile.name.clone()),
@@ -278,8 +259,7 @@ fn properties(trace: &Trace, facts: &LaneFacts, options: &PlayOptions) -> Vec<(S
         ("impact_closing_speed_mps", at_contact(outcome.impact_closing_speed)),
         ("end_s", time(outcome.end_step)),
         ("end", end.to_owned()),
-    ];
-    list.into_iter().map(|(name, value)| (format!("lanesweep.{name}"), value)).collect()
+    ]
 }
 
 /// Maximum difference between given sizes and the lane's, m: the rounding of binary32.
@@ -290,39 +270,35 @@ const TOLERANCE_M: f64 = 1e-3;
 ///
 /// # Errors
 /// [`Error::Input`] if the given sizes do not match the lane.
-fn sizes_of_case(lane: &str, case: &LaneCase<f64>, known: Option<&Sizes>, ego_length_m: f64) -> Result<Sizes> {
+fn sizes_of_case<W: Real>(lane: &str, case: &LaneCase<W>, known: Option<&Sizes>, ego_length_m: f64) -> Result<Sizes> {
     let is_pair = case.pair != 0;
-    let sums = |of: fn(&lanesweep_engine::LaneOther<f64>) -> f64| case.others.each_ref().map(|o| 2.0 * of(o));
-    let (lengths, widths) = (sums(|o| o.half_lengths), sums(|o| o.half_widths));
+    let (ego_width, lane_width_m) = (case.ego_width.to_f64(), case.lane_width.to_f64());
+    let lengths = case.others.map(|other| 2.0 * other.half_lengths.to_f64());
+    let widths = case.others.map(|other| 2.0 * other.half_widths.to_f64());
     let Some(known) = known else {
         let shortest = if is_pair { lengths[0].min(lengths[1]) } else { lengths[0] };
         // Every vehicle has a length above 0.
         let ego = ego_length_m.min(shortest / 2.0);
-        let size = |at: usize| VehicleSize { length_m: lengths[at] - ego, width_m: widths[at] - case.ego_width };
+        let size = |at: usize| VehicleSize { length_m: lengths[at] - ego, width_m: widths[at] - ego_width };
         return Ok(Sizes {
-            ego: VehicleSize { length_m: ego, width_m: case.ego_width },
+            ego: VehicleSize { length_m: ego, width_m: ego_width },
             target: size(0),
             lead: is_pair.then(|| size(1)),
-            lane_width_m: case.lane_width,
+            lane_width_m,
         });
     };
     let others = [Some(known.target), known.lead.filter(|_| is_pair)];
-    let mut pairs = vec![("width of the ego", known.ego.width_m, case.ego_width)];
+    let mut pairs = vec![("width of the ego", known.ego.width_m, ego_width)];
     for (at, other) in others.iter().enumerate().filter_map(|(at, other)| Some((at, other.as_ref()?))) {
         pairs.push(("sum of two lengths", known.ego.length_m + other.length_m, lengths[at]));
         pairs.push(("sum of two widths", known.ego.width_m + other.width_m, widths[at]));
     }
-    if let Some((what, expected, lane_has)) = pairs.iter().find(|(_, a, b)| (a - b).abs() > TOLERANCE_M) {
-        let problem = format!("the {what} is {expected} m by the scenarios and {lane_has} m in the run");
-        let help = format!(
-            "give the scenario file of the run ({}), or leave it out: every gap and contact stays",
-            option("scenarios")
-        );
-        return Err(Error::input(Place::item(format!("lane {lane}")), problem, help));
-    }
-    if is_pair && known.lead.is_none() {
-        let help = format!("give the scenario file of the run ({}), or leave it out", option("scenarios"));
-        return Err(Error::input(Place::item(format!("lane {lane}")), "the vehicle ahead has no size", help));
-    }
-    Ok(*known)
+    let problem = match pairs.iter().find(|(_, a, b)| (a - b).abs() > TOLERANCE_M) {
+        Some((what, known, run)) => format!("the {what} is {known} m by the scenarios and {run} m in the run"),
+        None if is_pair && known.lead.is_none() => "the vehicle ahead has no size".to_owned(),
+        None => return Ok(*known),
+    };
+    let scenarios = option("scenarios");
+    let help = format!("give the scenario file of the run ({scenarios}), or leave it out: every gap and contact stays");
+    Err(Error::input(Place::item(format!("lane {lane}")), problem, help))
 }

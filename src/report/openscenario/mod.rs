@@ -10,7 +10,7 @@ mod scenario_file;
 
 pub use concrete::{Concrete, EgoMotion, PlayedVehicle, Vertex};
 pub use lanes::{PlayOptions, concrete_case, concrete_lanes};
-pub use scenario_file::{INDEX, IndexRow, export_folder};
+pub use scenario_file::{INDEX, export_folder};
 
 /// Date of every file; it is constant, so that the same input gives the same bytes.
 const DATE: &str = "1970-01-01T00:00:00";

@@ -21,7 +21,7 @@ use lanesweep_support::table::Table;
 const EGO_SPEED: &str = "ego_speed_mps";
 
 /// Property for an overlap of two vehicles other than the ego: its time, s.
-const OTHERS_OVERLAP: &str = "lanesweep.others_overlap_s";
+const OTHERS_OVERLAP: &str = "others_overlap_s";
 
 /// Height of every vehicle, m; lanes have no height.
 const HEIGHT_M: f64 = 1.5;
@@ -45,10 +45,10 @@ fn scenario_file(scenario: &Concrete, road: &str) -> Result<String> {
         )
     });
     let description = format!("{synthetic}{} {}{overlap}", scenario.category.label(), scenario.key);
-    let own = scenario.properties.iter().map(|(name, value)| (name.as_str(), value));
+    let own = scenario.properties.iter().map(|(name, value)| (*name, value));
     let properties = own
         .chain(overlap_s.iter().map(|time_s| (OTHERS_OVERLAP, time_s)))
-        .map(|(name, value)| format!("      <Property name=\"{}\" value=\"{}\"/>\n", escaped(name), escaped(value)));
+        .map(|(name, value)| format!("      <Property name=\"lanesweep.{name}\" value=\"{}\"/>\n", escaped(value)));
     let skipped = usize::from(scenario.ego == EgoMotion::External);
     let followers = scenario.vehicles.iter().skip(skipped);
     Ok(format!(
@@ -129,57 +129,32 @@ fn identifier(name: &str) -> String {
 /// File name of the index, the record of an export.
 pub const INDEX: &str = "index.csv";
 
-/// One line of the index.
-#[derive(Debug, Clone, PartialEq)]
-pub struct IndexRow {
-    /// File of the scenario.
-    pub file: String,
-    /// File of the road.
-    pub road: String,
-    /// Lane key.
-    pub lane: String,
-}
-
 /// Writes every scenario with its road, and the index, to a folder; replaces an earlier export.
 ///
 /// # Errors
 /// As `scenario_file`; [`lanesweep_support::Error::Io`].
-pub fn export_folder(dir: &Path, scenarios: &[Concrete]) -> Result<Vec<IndexRow>> {
+pub fn export_folder(dir: &Path, scenarios: &[Concrete]) -> Result<()> {
     // Everything is built before the first file is written, so that an error leaves the folder unchanged.
-    let row = |(at, scenario): (usize, &Concrete)| {
-        let stem = format!("{:03}-{}", at + 1, safe(&scenario.key));
-        IndexRow { file: format!("{stem}.xosc"), road: format!("{stem}.xodr"), lane: scenario.key.clone() }
-    };
-    let rows: Vec<IndexRow> = scenarios.iter().enumerate().map(row).collect();
-    let texts = scenarios.iter().zip(&rows).map(|(scenario, row)| scenario_file(scenario, &row.road));
+    let stem = |(at, scenario): (usize, &Concrete)| format!("{:03}-{}", at + 1, safe(&scenario.key));
+    let stems: Vec<String> = scenarios.iter().enumerate().map(stem).collect();
+    let texts = scenarios.iter().zip(&stems).map(|(scenario, stem)| scenario_file(scenario, &format!("{stem}.xodr")));
     let texts = texts.collect::<Result<Vec<_>>>()?;
     let folder = RunFolder::open(dir, INDEX)?;
     let mut results = folder.results()?;
-    // The lane already has its own column.
-    let names: Vec<String> = scenarios.first().map_or(Vec::new(), |s| {
-        s.properties.iter().map(|(name, _)| name.clone()).filter(|name| name != "lanesweep.lane").collect()
-    });
-    for ((scenario, row), text) in scenarios.iter().zip(&rows).zip(&texts) {
-        results.add(&row.road, road_file(scenario).as_bytes())?;
-        results.add(&row.file, text.as_bytes())?;
+    for ((scenario, stem), text) in scenarios.iter().zip(&stems).zip(&texts) {
+        results.add(&format!("{stem}.xodr"), road_file(scenario).as_bytes())?;
+        results.add(&format!("{stem}.xosc"), text.as_bytes())?;
     }
-    let property = |scenario: &Concrete, name: &String| {
-        scenario.properties.iter().find(|(n, _)| n == name).map(|(_, value)| value.clone())
-    };
-    let table = Table::of(rows.iter().zip(scenarios))
-        .column("file", |(row, _)| row.file.as_str())
-        .column("road", |(row, _)| row.road.as_str())
-        .column("lane", |(row, _)| row.lane.as_str())
+    // All have the same properties.
+    let properties = 1..scenarios.first().map_or(1, |scenario| scenario.properties.len());
+    let table = Table::of(stems.iter().zip(scenarios))
+        .column("file", |(stem, _)| format!("{stem}.xosc"))
+        .column("road", |(stem, _)| format!("{stem}.xodr"))
+        .column("lane", |(_, scenario)| scenario.key.as_str())
         .column("category", |(_, scenario)| scenario.category.key())
-        .columns(&names, |name| property_text(name), |(_, scenario), name| property(scenario, name))
+        .columns(properties, |at| scenarios[0].properties[at].0, |(_, of), at| of.properties[at].1.as_str())
         .build();
-    results.publish(table.csv().as_bytes())?;
-    Ok(rows)
-}
-
-/// The column name of a property.
-fn property_text(property: &str) -> String {
-    property.strip_prefix("lanesweep.").unwrap_or(property).to_owned()
+    results.publish(table.csv().as_bytes())
 }
 
 /// A lane key as part of a file name that is valid on every system.

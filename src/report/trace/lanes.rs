@@ -92,24 +92,20 @@ fn summary(lane: &TracedLane, is_one_of_many: bool) -> String {
     };
     let outcome = &trace.outcome;
     let name = if is_one_of_many { format!("{key}: ") } else { String::new() };
+    let (category, model, verdicts) = (trace.category.label(), trace.model.name(), verdicts(outcome));
+    let ([reacted, last], end) =
+        ([outcome.reaction_step, outcome.end_step].map(time), end(outcome, trace.contact_label()));
+    let ttc = outcome.approach_ttc().map_or("–".to_owned(), |ttc_s| format!("{} s", value(ttc_s)));
+    let [gap_m, btn, least_m] = [trace.initial_gap_m, outcome.max_btn, records::smallest_gap_m(outcome)].map(value);
     let mut text = format!(
-        "{name}{} {}, initial gap {} m: {}\n  reacted: {}  end: {} ({})\n  min TTC {}, max BTN {}, min gap {} m\n",
-        trace.category.label(),
-        trace.model.name(),
-        value(trace.initial_gap_m),
-        verdicts(outcome),
-        time(outcome.reaction_step),
-        time(outcome.end_step),
-        end(outcome, trace.contact_label()),
-        outcome.approach_ttc().map_or_else(|| "–".to_owned(), |ttc_s| format!("{} s", value(ttc_s))),
-        value(outcome.max_btn),
-        value(records::smallest_gap_m(outcome))
+        "{name}{category} {model}, initial gap {gap_m} m: {verdicts}\n  reacted: {reacted}  end: {last} ({end})\n  \
+         min TTC {ttc}, max BTN {btn}, min gap {least_m} m\n"
     );
     if let Some(reference) = reference {
-        text.push_str(&match differences(outcome, reference, &time) {
-            list if list.is_empty() => "  f64: the same verdicts, contact and times\n".to_owned(),
+        text += &match &differences(outcome, reference, &time)[..] {
+            [] => "  f64: the same verdicts, contact and times\n".to_owned(),
             list => format!("  f64 DIFFERS: {}\n", list.join("; ")),
-        });
+        };
     }
     text
 }
@@ -121,12 +117,10 @@ fn verdicts(outcome: &Outcome<f64>) -> String {
 
 fn end(outcome: &Outcome<f64>, contact: &str) -> String {
     match outcome.end {
-        EndReason::Contact => format!(
-            "{}, closing at {} m/s, the ego at {} m/s",
-            contact,
-            value(outcome.impact_closing_speed),
-            value(outcome.impact_speed)
-        ),
+        EndReason::Contact => {
+            let [closing, ego] = [outcome.impact_closing_speed, outcome.impact_speed].map(value);
+            format!("{contact}, closing at {closing} m/s, the ego at {ego} m/s")
+        }
         EndReason::Settled => "no further event is possible".to_owned(),
         EndReason::Standstill => "the ego is stationary".to_owned(),
         EndReason::Cap => "time cap".to_owned(),

@@ -69,9 +69,8 @@ impl TraceFigure<'_> {
         let (x, y) = seen.fold(((-8.0, 12.0), (-half_lane_m - 0.3, half_lane_m + 0.3)), |(x, y), [from, to]| {
             (wider(x, from.0 - 2.0, to.0 + 2.0), wider(y, from.1 - 0.3, to.1 + 0.3))
         });
-        let is_cut = x.1 > VIEW_M;
-        let x = (x.0, x.1.min(VIEW_M));
-        let cut = if is_cut { "What is farther than 120 m ahead is not shown. " } else { "" };
+        let cut = if x.1 > VIEW_M { "What is farther than 120 m ahead is not shown. " } else { "" };
+        let (x, lane_m) = ((x.0, x.1.min(VIEW_M)), plain(2.0 * half_lane_m, 3));
         let plot = |(heading, vehicles): Row| {
             let cell = |(corners, (tip, colour)): (Option<Corners>, (&'static str, &'static str))| {
                 Some(FilledCell { corners: corners?, colour, tip })
@@ -96,9 +95,7 @@ impl TraceFigure<'_> {
             plots: rows.into_iter().map(plot).collect(),
             columns: 1,
             caption: format!(
-                "{cut}Lateral positions in m, positive on the other vehicle's side. Long dashes: edges of a lane {} m \
-                 wide.",
-                plain(2.0 * half_lane_m, 3)
+                "{cut}Lateral positions in m, positive on the other vehicle's side. Long dashes: edges of a lane {lane_m} m wide."
             ),
             ..Figure::default()
         }

@@ -19,7 +19,8 @@ use crate::{Error, Result};
 pub struct ArrowRows {
     schema: SchemaRef,
     builders: Vec<(ColumnKind, Box<dyn ArrayBuilder>)>,
-    count: usize,
+    /// Number of rows since the last batch.
+    pub(crate) count: usize,
 }
 
 impl ArrowRows {
@@ -35,11 +36,6 @@ impl ArrowRows {
     /// The columns' names, types, units and descriptions.
     pub fn schema(&self) -> SchemaRef {
         self.schema.clone()
-    }
-
-    /// Number of rows since the last batch.
-    pub(crate) fn count(&self) -> usize {
-        self.count
     }
 
     /// Appends a row; a cell of another type than its column's becomes null.
@@ -114,16 +110,14 @@ fn append(kind: ColumnKind, builder: &mut Box<dyn ArrayBuilder>, cell: &Cell) ->
         ColumnKind::Series | ColumnKind::Wholes => {
             let list = typed::<ListBuilder<Box<dyn ArrayBuilder>>>(builder)?;
             match (kind, cell) {
-                (ColumnKind::Series, Cell::Series(series)) => {
-                    typed::<Float64Builder>(list.values())?.append_slice(series);
-                    list.append(true);
+                (ColumnKind::Series, Cell::Series(of)) => typed::<Float64Builder>(list.values())?.append_slice(of),
+                (ColumnKind::Wholes, Cell::Wholes(of)) => typed::<Int64Builder>(list.values())?.append_slice(of),
+                _ => {
+                    list.append(false);
+                    return Ok(());
                 }
-                (ColumnKind::Wholes, Cell::Wholes(numbers)) => {
-                    typed::<Int64Builder>(list.values())?.append_slice(numbers);
-                    list.append(true);
-                }
-                _ => list.append(false),
             }
+            list.append(true);
         }
     }
     Ok(())

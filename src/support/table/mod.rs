@@ -17,19 +17,17 @@ mod parquet_reader;
 #[cfg(feature = "parquet")]
 mod parquet_writer;
 mod reader;
-mod text;
 mod writer;
 
 #[cfg(feature = "arrow")]
 pub use arrow::ArrowRows;
 pub use column::{Cell, Column, ColumnKind, Digits, Row, TableMetadata, TableRows};
 pub use csv_reader::{delimiter_of, has_decimal_commas};
-pub use memory::{CellValue, NamedValue, NumberText, Table, TableOf};
+pub use memory::{CellValue, NamedValue, NumberText, Table, TableOf, WIDTH};
 pub use names::{NameUnit, Named, Resolved, nearest, resolve};
 #[cfg(feature = "parquet")]
 pub use parquet_reader::is_panic_caught;
 pub use reader::TableReader;
-pub use text::WIDTH;
 pub use writer::{TableWriter, json_number, json_value, text_of_cell};
 
 use std::path::Path;
@@ -87,11 +85,8 @@ impl TableFormat {
             Some(format) => Ok(*format),
             None => {
                 let known: Vec<String> = usable.iter().map(|format| format!(".{}", format.endings()[0])).collect();
-                Err(Error::usage(
-                    place(),
-                    format!("`.{ending}` is no format of tables here"),
-                    format!("use a name that ends in {}", or_list(&known)),
-                ))
+                let help = format!("use a name that ends in {}", or_list(&known));
+                Err(Error::usage(place(), format!("`.{ending}` is no format of tables here"), help))
             }
         }
     }

@@ -146,11 +146,8 @@ fn guarded<T, E: Display>(path: &Path, work: impl FnOnce() -> result::Result<T, 
 
 fn damaged(path: &Path, problem: impl Display) -> Error {
     let problem = format!("not a Parquet file that can be read: {problem}");
-    Error::input(
-        Place::file(path),
-        problem,
-        "write the file again, with compression=\"zstd\", or use JSON Lines or CSV",
-    )
+    let help = "write the file again, with compression=\"zstd\", or use JSON Lines or CSV";
+    Error::input(Place::file(path), problem, help)
 }
 
 impl ParquetRows {

@@ -58,7 +58,7 @@ impl ParquetFile {
     /// Appends a row. The caller has checked that the cells match the columns.
     pub(super) fn row(&mut self, row: &[Cell]) -> Result<()> {
         self.rows.row(row)?;
-        if self.rows.count() == self.batch_rows { self.flush() } else { Ok(()) }
+        if self.rows.count == self.batch_rows { self.flush() } else { Ok(()) }
     }
 
     fn flush(&mut self) -> Result<()> {
@@ -67,7 +67,7 @@ impl ParquetFile {
 
     /// Completes the file under its hidden name.
     pub(super) fn finish(mut self) -> Result<AtomicFile> {
-        if self.rows.count() > 0 {
+        if self.rows.count > 0 {
             self.flush()?;
         }
         self.writer.into_inner().map_err(|e| failed(&self.path, e))
@@ -92,16 +92,14 @@ fn key_values(columns: &[Column], facts: &TableMetadata) -> Vec<KeyValue> {
         .iter()
         .map(|c| serde_json::json!({"name": c.name, "type": c.kind.name(), "unit": c.unit, "description": c.description}))
         .collect();
-    let mut list = vec![
-        KeyValue::new("lanesweep.version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
-        KeyValue::new("lanesweep.table".to_owned(), facts.table.to_owned()),
+    let pairs = [
+        ("version", Some(env!("CARGO_PKG_VERSION").to_owned())),
+        ("table", Some(facts.table.to_owned())),
+        ("profile", facts.profile.clone()),
+        ("plan_sha256", facts.plan_sha256.clone()),
+        ("synthetic", facts.synthetic.then(|| "true".to_owned())),
+        ("columns", Some(serde_json::Value::from(words).to_string())),
     ];
-    let mut add = |key: &str, value: Option<String>| {
-        list.extend(value.map(|value| KeyValue::new(format!("lanesweep.{key}"), value)));
-    };
-    add("profile", facts.profile.clone());
-    add("plan_sha256", facts.plan_sha256.clone());
-    add("synthetic", facts.synthetic.then(|| "true".to_owned()));
-    add("columns", Some(serde_json::Value::from(words).to_string()));
-    list
+    let known = |(key, value): (_, Option<String>)| Some(KeyValue::new(format!("lanesweep.{key}"), value?));
+    pairs.into_iter().filter_map(known).collect()
 }

@@ -10,14 +10,14 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::miner::{CategoryCount, Mined, mine};
-use super::noise::noise_notes;
 use super::options::MiningOptions;
 use super::{cut_in, cut_out, lvd};
 use crate::trajectory::generator::{GeneratorOptions, generate_one};
-use crate::trajectory::{FileChecksum, FrameIndex, InputFile, Inputs, Loaded, Recording, VehicleAtFrame};
+use crate::trajectory::{FileChecksum, FrameIndex, InputFile, Inputs, Loaded, Noise, Recording, VehicleAtFrame};
 use lanesweep_model::plausibility::Implausible;
 use lanesweep_model::scenario::{Category, Scenario, ScenarioFile, mined_id, usable};
-use lanesweep_support::{Error, Place, Result, option, readable};
+use lanesweep_support::readable::{self, significant, value};
+use lanesweep_support::{Error, Place, Result, option};
 
 /// Results of one recording.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -94,11 +94,8 @@ impl Collection {
 
 /// Found and kept scenarios of a category.
 pub fn count(scenarios: &[Scenario], category: Category) -> CategoryCount {
-    let of = scenarios.iter().filter(|s| s.category == category);
-    of.fold(CategoryCount::default(), |sum, s| CategoryCount {
-        found: sum.found + 1,
-        kept: sum.kept + u64::from(s.kept),
-    })
+    let of = || scenarios.iter().filter(|s| s.category == category);
+    CategoryCount { found: of().count() as u64, kept: of().filter(|s| s.kept).count() as u64 }
 }
 
 /// Found and kept scenarios of every category, in their order.
@@ -177,7 +174,7 @@ pub fn mine_inputs(
     done: impl Fn() -> Result<()> + Sync,
 ) -> Result<Collection> {
     options.validate()?;
-    let preset = inputs.preset().map(|preset| format!("{} (sha256 {})", preset.name, preset.sha256));
+    let preset = inputs.preset.as_ref().map(|preset| format!("{} (sha256 {})", preset.name, preset.sha256));
     let (files, problems) = inputs.files();
     let part = |loaded: Loaded| {
         let (data_sets, ScenarioFile { scenarios, problems, notes }) = mine_loaded(&loaded, options, implausible);
@@ -230,9 +227,8 @@ pub fn mine_loaded(loaded: &Loaded, options: &MiningOptions, implausible: Implau
     found.notes.extend(noise_notes(&loaded.recording, options));
     if mined.data_sets == 0 {
         let cut_m = options.ego_view.cut_m;
-        found
-            .notes
-            .push(format!("no vehicle drives {cut_m} m in view (`ego_view.cut_m`), so none is an ego: lower it"));
+        let note = format!("no vehicle drives {cut_m} m in view (`ego_view.cut_m`), so none is an ego: lower it");
+        found.notes.push(note);
     }
     (mined.data_sets, found)
 }
@@ -277,6 +273,28 @@ pub fn mine_generated(
     let mut collection = Collection::default();
     parts.into_iter().for_each(|part| collection.add(part));
     Ok(collection)
+}
+
+/// Noise of accelerations above this fraction of the threshold of the peak can decide. Drivers who dawdle, as those of SUMO, make 0.22.
+const MAX_FRACTION: f64 = 0.3;
+/// Lateral motion over the window of mining is so many standard deviations of noise at most by chance.
+const LATERAL_DEVIATIONS: f64 = 4.0;
+
+/// Notes on a recording whose noise can decide what is mined; none for good data.
+fn noise_notes(recording: &Recording, options: &MiningOptions) -> impl Iterator<Item = String> {
+    let (noise, window_s) = (Noise::of(recording), options.lateral.window_s);
+    let (threshold, calm_m) = (options.lvd.min_peak_deceleration_mps2, options.lateral.quiescent_speed_mps * window_s);
+    let [peak, acceleration] = [value(threshold), significant(noise.acceleration_mps2, 2)];
+    let of_peaks = (threshold > 0.0 && noise.acceleration_mps2 > MAX_FRACTION * threshold).then(|| format!(
+        "noise can decide which leader decelerations are found and kept: that of accelerations is {acceleration} m/s², the threshold of \
+         the peak {peak} m/s²; smooth the positions by `smoothing_s` in a preset, 1 s and longer"
+    ));
+    let [lateral, calm, window] = [significant(noise.lateral_m, 2), significant(calm_m, 2), value(window_s)];
+    let of_changes = (LATERAL_DEVIATIONS * noise.lateral_m > calm_m).then(|| format!(
+        "noise can decide when lane changes begin and end: that of positions across the road is {lateral} m, and less than {calm} m in \
+         {window} s count as no lateral motion"
+    ));
+    of_peaks.into_iter().chain(of_changes)
 }
 
 /// Recordings with more of their instants in others count them twice.

@@ -15,10 +15,9 @@ use super::tags::{Item, Match, Tags};
 use lanesweep_model::scenario::{Category, Scenario, Side};
 
 /// The items, in order.
-pub const ITEMS: [Item<'static, Tags>; 2] =
-    [&|t: &Tags| t.has(Tags::CHANGES_IN | Tags::EGO_KEEPS_LANE) && !t.has(Tags::LEADER), &|t: &Tags| {
-        t.has(Tags::CHANGES_IN | Tags::EGO_KEEPS_LANE | Tags::LEADER)
-    }];
+pub const ITEMS: [Item<'static, Tags>; 2] = [&|t: &Tags| t.changes_in && t.ego_keeps_lane && !t.leader, &|t: &Tags| {
+    t.changes_in && t.ego_keeps_lane && t.leader
+}];
 
 /// The scenario of one match, with the verdict of the filters.
 pub(super) fn scenario(set: &DataSet, target_index: usize, matched: &Match, stretch: &Stretch) -> Option<Scenario> {
@@ -72,16 +71,13 @@ pub(super) fn with_lane_change<'a>(
 
 /// The event that ended a match, from the tags at its end.
 fn end_cause(at_end: Tags, matched: &Match, category: Category) -> &'static str {
-    // The lane change, and whether the target leads in the last item.
-    let (change, leads) =
-        if category == Category::CutIn { (Tags::CHANGES_IN, true) } else { (Tags::CHANGES_OUT, false) };
-    if matched.clamped {
-        "data_end"
-    } else if !at_end.has(change) {
-        "lc_end"
-    } else if at_end.has(Tags::LEADER) != leads {
-        "leader"
-    } else {
-        "ego_lane"
+    // Whether the lane change is in progress, and whether the target leads in the last item.
+    let is_cut_in = category == Category::CutIn;
+    let (changes, leads) = (if is_cut_in { at_end.changes_in } else { at_end.changes_out }, is_cut_in);
+    match (changes, at_end.leader == leads) {
+        _ if matched.clamped => "data_end",
+        (false, _) => "lc_end",
+        (true, false) => "leader",
+        (true, true) => "ego_lane",
     }
 }

@@ -18,8 +18,8 @@ use lanesweep_model::scenario::{Category, Scenario};
 
 /// The items, in order.
 pub(super) const ITEMS: [Item<'static, Tags>; 2] =
-    [&|t: &Tags| t.has(Tags::CHANGES_OUT | Tags::EGO_KEEPS_LANE | Tags::LEADER), &|t: &Tags| {
-        t.has(Tags::CHANGES_OUT | Tags::EGO_KEEPS_LANE) && !t.has(Tags::LEADER)
+    [&|t: &Tags| t.changes_out && t.ego_keeps_lane && t.leader, &|t: &Tags| {
+        t.changes_out && t.ego_keeps_lane && !t.leader
     }];
 
 /// The scenario of one match, with the verdict of the filters.

@@ -3,6 +3,7 @@
 //!
 //! [`FoundScenario`] is what all categories take from the tracks of a match.
 
+use super::longitudinal::Longitudinal;
 use super::options::{MiningOptions, TOLERANCE};
 use super::tags::{Activities, Tags};
 use crate::trajectory::{Carriageway, FrameIndex, Lane, NO_LANE, Recording, Track};
@@ -57,25 +58,21 @@ impl<'a> DataSet<'a> {
         let samples = recording_tags.options.ego_view.last_sample(ego)? + 1;
         let carriageway = &recording_tags.recording.carriageways[ego.carriageway];
         let mut set = DataSet { recording_tags, ego_index, ego, carriageway, samples, leader: Vec::new() };
-        let mut last = None;
-        set.leader = (0..samples)
-            .map(|k| {
-                last = set.leader_at(k, last);
-                last
-            })
-            .collect();
+        let leader = (0..samples).scan(None, |last, k| {
+            *last = set.leader_at(k, *last);
+            Some(*last)
+        });
+        set.leader = leader.collect();
         Some(set)
     }
 
     /// All vehicles that lead at some sample, in the order of their first leading sample.
     pub(super) fn leaders(&self) -> Vec<usize> {
         let mut leaders: Vec<usize> = Vec::new();
-        let mut last = None;
         for leader in self.leader.iter().flatten().map(|&l| l as usize) {
-            if last != Some(leader) && !leaders.contains(&leader) {
+            if !leaders.contains(&leader) {
                 leaders.push(leader);
             }
-            last = Some(leader);
         }
         leaders
     }
@@ -126,19 +123,13 @@ impl<'a> DataSet<'a> {
         let first = (-offset).max(0);
         let end = (target.len() as i64 - offset).min(self.samples as i64);
         let mut stretches: Vec<Stretch> = Vec::new();
-        let mut open = false;
-        for k in first..end {
-            let (k, j) = (k as usize, (k + offset) as usize);
-            if !self.in_range(k, target, j) {
-                open = false;
-                continue;
-            }
-            if !open {
-                stretches.push(Stretch { first: k, tags: Vec::new() });
-                open = true;
-            }
-            if let Some(stretch) = stretches.last_mut() {
-                stretch.tags.push(self.tags(k, target_index, j));
+        for (k, j) in (first..end).map(|k| (k as usize, (k + offset) as usize)) {
+            if self.in_range(k, target, j) {
+                let tags = self.tags(k, target_index, j);
+                match stretches.last_mut() {
+                    Some(open) if open.first + open.tags.len() == k => open.tags.push(tags),
+                    _ => stretches.push(Stretch { first: k, tags: vec![tags] }),
+                }
             }
         }
         stretches
@@ -149,13 +140,13 @@ impl<'a> DataSet<'a> {
         let (ego, target) =
             (&self.recording_tags.activities[self.ego_index], &self.recording_tags.activities[target_index]);
         let change = target.lane_change(lane, j).map(|c| c.kind.is_in());
-        let decelerates = target.longitudinal_at(j) == Some(super::longitudinal::Longitudinal::Decelerating);
-        Tags::default()
-            .with(Tags::LEADER, self.leader[k] == Some(target_index as u32))
-            .with(Tags::CHANGES_IN, change == Some(true))
-            .with(Tags::CHANGES_OUT, change == Some(false))
-            .with(Tags::DECELERATES, decelerates)
-            .with(Tags::EGO_KEEPS_LANE, lane != NO_LANE && ego.lane_change(lane, k).is_none())
+        Tags {
+            leader: self.leader[k] == Some(target_index as u32),
+            changes_in: change == Some(true),
+            changes_out: change == Some(false),
+            decelerates: target.longitudinal_at(j) == Some(Longitudinal::Decelerating),
+            ego_keeps_lane: lane != NO_LANE && ego.lane_change(lane, k).is_none(),
+        }
     }
 }
 
@@ -216,7 +207,10 @@ impl FoundScenario<'_> {
             target: self.other(self.target, side)?,
             thw0: (v0 > 0.0).then(|| gap0 / v0),
             gap0: Some(gap0),
-            peak_decel: Some(peak_deceleration(&self.target.a_s_mps2[first..=last])),
+            // Negative where the vehicle accelerates throughout.
+            peak_decel: Some(
+                self.target.a_s_mps2[first..=last].iter().map(|a| -a).fold(f64::NEG_INFINITY, f64::max) + 0.0,
+            ),
             synthetic: recording_tags.recording.synthetic,
             ..Scenario::default()
         })
@@ -249,9 +243,4 @@ pub(super) fn speed(v_mps: f64) -> f64 {
 /// would differ in the last bits.
 pub(super) fn micrometres(length_m: f64) -> f64 {
     (length_m * 1e6).round() / 1e6 + 0.0 // + 0.0: no negative zero
-}
-
-/// Largest deceleration, m/s²; negative where the vehicle accelerates throughout.
-fn peak_deceleration(a_mps2: &[f64]) -> f64 {
-    a_mps2.iter().fold(f64::NEG_INFINITY, |peak, &a| peak.max(-a)) + 0.0
 }

@@ -56,12 +56,14 @@ pub struct LaneChange {
 
 /// Lane changes of a whole track with lateral positions `d_m` relative to `lane`: ascending, not overlapping.
 pub fn lane_changes(d_m: &[f64], lane: Lane, frame_rate_hz: f64, options: &LateralOptions) -> Vec<LaneChange> {
-    let crossings = crossings(d_m, lane);
     let mut found: Vec<LaneChange> = Vec::new();
-    for (k, kind) in crossings {
+    for (k, kind) in (1..d_m.len()).flat_map(|k| LaneChangeKind::ALL.map(|kind| (k, kind))) {
         let free_from = found.last().map_or(0, |c| c.end);
-        if k < free_from {
-            continue; // already changing
+        let [before, now] = [k - 1, k].map(|k| kind.past_line(d_m[k], lane));
+        let is_crossed = before <= TOLERANCE && now > TOLERANCE;
+        // Not where the vehicle is already changing.
+        if k < free_from || !is_crossed {
+            continue;
         }
         let s: Vec<f64> = d_m.iter().map(|&d| kind.past_line(d, lane)).collect();
         let profile = LineDistance::new(&s, lane.width_m(), frame_rate_hz, options);
@@ -71,19 +73,6 @@ pub fn lane_changes(d_m: &[f64], lane: Lane, frame_rate_hz: f64, options: &Later
         }
     }
     found
-}
-
-/// Samples at which the vehicle crosses a line of the lane, ascending, with the possible change of each.
-fn crossings(d_m: &[f64], lane: Lane) -> Vec<(usize, LaneChangeKind)> {
-    let mut crossings = Vec::new();
-    for k in 1..d_m.len() {
-        for kind in LaneChangeKind::ALL {
-            if kind.past_line(d_m[k - 1], lane) <= TOLERANCE && kind.past_line(d_m[k], lane) > TOLERANCE {
-                crossings.push((k, kind));
-            }
-        }
-    }
-    crossings
 }
 
 /// `s` over the track, and the limits that determine begin and end of the change.

@@ -85,22 +85,15 @@ fn detect(v: &[f64], window: usize, options: &LongitudinalOptions) -> Vec<Longit
     let mut now = Cruising;
     let mut end = None;
     for k in window..v.len() {
-        let tests = [(Accelerating, &rise), (Decelerating, &fall)];
-        let begun = tests.into_iter().find_map(|(activity, series)| {
-            if activity == now {
-                return None;
-            }
-            series.start(k, options.min_speed_change_mps).map(|end| (activity, end))
-        });
-        if let Some((activity, its_end)) = begun {
-            now = activity;
-            end = its_end;
-        } else if end == Some(k) {
-            now = Cruising;
-            end = None;
-        } else {
-            continue;
-        }
+        let others =
+            [(Accelerating, &rise), (Decelerating, &fall)].into_iter().filter(|(activity, _)| *activity != now);
+        let begun =
+            { others }.find_map(|(activity, series)| Some((activity, series.start(k, options.min_speed_change_mps)?)));
+        (now, end) = match begun {
+            Some(begun) => begun,
+            None if end == Some(k) => (Cruising, None),
+            None => continue,
+        };
         events.push(LongitudinalEvent { start: k, activity: now });
     }
     events

@@ -10,7 +10,7 @@ use super::tags::{Item, Match, Tags};
 use lanesweep_model::scenario::{Category, Scenario, Side};
 
 /// The items, in order.
-pub const ITEMS: [Item<'static, Tags>; 1] = [&|t: &Tags| t.has(Tags::LEADER | Tags::DECELERATES)];
+pub const ITEMS: [Item<'static, Tags>; 1] = [&|t: &Tags| t.leader && t.decelerates];
 
 /// The scenario of one match, with the verdict of the filter; `None` if too little is left after trimming. `first` is
 /// the ego's sample of the first tags of the match's stretch.

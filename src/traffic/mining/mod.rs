@@ -23,7 +23,6 @@ pub mod lateral;
 pub mod longitudinal;
 pub mod lvd;
 mod miner;
-mod noise;
 mod options;
 pub mod tags;
 

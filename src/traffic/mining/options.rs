@@ -5,12 +5,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::trajectory::{EgoViewOptions, LIMIT_TOLERANCE_M};
-use lanesweep_support::{Error, Place, Result, ranges, settings};
+use lanesweep_support::{Error, Place, Result, config_tables, ranges};
 
-settings! {
+config_tables! {
     /// All options of `mine`. The ranges are those in which a value has its meaning.
-    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-    #[serde(default, deny_unknown_fields)]
     pub struct MiningOptions {
         /// Extent of an ego's data set. Default 100 m around the ego, to 100 m before its final position (paper).
         pub ego_view: EgoViewOptions = EgoViewOptions::default(),
@@ -30,8 +28,6 @@ settings! {
     }
 
     /// Longitudinal activities.
-    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-    #[serde(default, deny_unknown_fields)]
     pub struct LongitudinalOptions {
         /// Window of a speed change, s. Default 1 (k_h).
         #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0))]
@@ -48,8 +44,6 @@ settings! {
     }
 
     /// Lane changes.
-    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-    #[serde(default, deny_unknown_fields)]
     pub struct LateralOptions {
         /// Window of lateral motion, s. Default 1 (k_h).
         #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0))]
@@ -71,23 +65,8 @@ settings! {
         /// Which window decides that a lane change has ended. Default [`LaneChangeEnd::Observed`].
         pub lc_end: LaneChangeEnd = LaneChangeEnd::Observed,
     }
-}
 
-/// Position of the window in which steady lateral motion ends a lane change. It determines T.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum LaneChangeEnd {
-    /// The window begins at the sample (the published formula). The change ends up to 1 s early.
-    Published,
-    /// The window ends at the sample: closest to the true end of the motion.
-    #[default]
-    Observed,
-}
-
-settings! {
     /// The cut-in: what counts as found, and the filters of the paper.
-    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-    #[serde(default, deny_unknown_fields)]
     pub struct CutInOptions {
         /// Shorter ones are discarded, s. Default 0.1.
         #[schemars(range(min = 0.0, max = 60.0))]
@@ -104,8 +83,6 @@ settings! {
     }
 
     /// The cut-out: what counts as found, and the filters of the paper.
-    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-    #[serde(default, deny_unknown_fields)]
     pub struct CutOutOptions {
         /// Shorter ones are discarded, s. Default 0.1.
         #[schemars(range(min = 0.0, max = 60.0))]
@@ -119,8 +96,6 @@ settings! {
     }
 
     /// The leader deceleration: what counts as found, and the filter of the paper.
-    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-    #[serde(default, deny_unknown_fields)]
     pub struct LvdOptions {
         /// Intervals of the tags up to this long are discarded, s. Default 0.1.
         #[schemars(range(min = 0.0, max = 60.0))]
@@ -132,6 +107,17 @@ settings! {
         #[schemars(range(min = 0.0, max = 30.0))]
         pub min_peak_deceleration_mps2: f64 = 2.0,
     }
+}
+
+/// Position of the window in which steady lateral motion ends a lane change. It determines T.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LaneChangeEnd {
+    /// The window begins at the sample (the published formula). The change ends up to 1 s early.
+    Published,
+    /// The window ends at the sample: closest to the true end of the motion.
+    #[default]
+    Observed,
 }
 
 impl MiningOptions {

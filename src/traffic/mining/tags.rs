@@ -10,38 +10,19 @@ use super::longitudinal::{Longitudinal, LongitudinalEvent, longitudinal_events};
 use super::options::{MiningOptions, TOLERANCE};
 use crate::trajectory::{Carriageway, Track};
 
-/// Tags of one ego and one target at one sample, as a set of bits.
+/// Tags of one ego and one target at one sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Tags(u8);
-
-impl Tags {
+pub struct Tags {
     /// The target is the ego's leader.
-    pub const LEADER: Tags = Tags(1);
+    pub leader: bool,
     /// The target changes into the lane the ego is in (`li` or `ri`).
-    pub const CHANGES_IN: Tags = Tags(2);
+    pub changes_in: bool,
     /// The target changes out of the lane the ego is in (`lo` or `ro`).
-    pub const CHANGES_OUT: Tags = Tags(4);
+    pub changes_out: bool,
     /// The target decelerates.
-    pub const DECELERATES: Tags = Tags(8);
+    pub decelerates: bool,
     /// The ego is in a lane and in no lane change.
-    pub const EGO_KEEPS_LANE: Tags = Tags(16);
-
-    /// All of `others` are set.
-    pub(crate) fn has(self, others: Tags) -> bool {
-        self.0 & others.0 == others.0
-    }
-
-    /// With `others` set if `condition` holds.
-    pub fn with(self, others: Tags, condition: bool) -> Tags {
-        if condition { Tags(self.0 | others.0) } else { self }
-    }
-}
-
-impl std::ops::BitOr for Tags {
-    type Output = Tags;
-    fn bitor(self, other: Tags) -> Tags {
-        Tags(self.0 | other.0)
-    }
+    pub ego_keeps_lane: bool,
 }
 
 /// Activities of a vehicle over its whole track; computed once for all egos.
@@ -59,14 +40,9 @@ impl Activities {
         let (low, high) = track.d_m.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &d| (l.min(d), h.max(d)));
         let reaches_a_line =
             carriageway.lane_lines_m.iter().any(|&line| line >= low - TOLERANCE && line <= high + TOLERANCE);
-        let lane_changes = if reaches_a_line {
-            (0..carriageway.lane_count())
-                .filter_map(|lane| carriageway.lane(lane))
-                .map(|lane| lane_changes(&track.d_m, lane, frame_rate_hz, &options.lateral))
-                .collect()
-        } else {
-            Vec::new()
-        };
+        let lanes = if reaches_a_line { carriageway.lane_count() } else { 0 };
+        let changes = |lane| lane_changes(&track.d_m, lane, frame_rate_hz, &options.lateral);
+        let lane_changes = (0..lanes).filter_map(|lane| carriageway.lane(lane)).map(changes).collect();
         let longitudinal = longitudinal_events(&track.v_s_mps, frame_rate_hz, &options.longitudinal);
         Activities { longitudinal, lane_changes }
     }

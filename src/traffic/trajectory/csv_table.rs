@@ -43,15 +43,17 @@ pub(super) type CsvColumn = usize;
 /// An open table, positioned on one of its lines.
 pub(super) struct CsvTable {
     path: PathBuf,
-    reader: Reader<HashingReader<Box<dyn Read + Send>>>,
+    reader: Reader<HashingReader>,
     /// Column names of the format, separated by commas: they are never reported as misspelt.
     known: &'static str,
-    header: Vec<String>,
+    /// The column names.
+    pub header: Vec<String>,
     record: ByteRecord,
     line: u64,
     /// Line on which the last record ended.
     last_line: u64,
-    decimal_commas: bool,
+    /// Numbers have commas in place of points.
+    pub has_decimal_commas: bool,
     is_plain: bool,
 }
 
@@ -77,10 +79,9 @@ impl CsvTable {
             file.by_ref().take(MAX_LINE_BYTES).read_to_end(&mut start).map_err(|e| Error::io(path, "read", e))?;
         }
         let delimiter = if known.is_empty() { delimiter_of(&start) } else { b',' };
-        let decimal_commas = delimiter != b',' && has_decimal_commas(&start, delimiter);
-        let inner: Box<dyn Read + Send> = Box::new(Cursor::new(start).chain(file));
-        let file =
-            HashingReader { inner, hash: Sha256::new(), bytes: 0, at_end: false, line_from: 0, is_endless: false };
+        let has_decimal_commas = delimiter != b',' && has_decimal_commas(&start, delimiter);
+        let inner = Box::new(Cursor::new(start).chain(file));
+        let file = HashingReader { inner, hash: Sha256::new(), bytes: 0, at_end: false, line_from: 0 };
         let reader = ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
@@ -97,17 +98,15 @@ impl CsvTable {
             record: ByteRecord::new(),
             line: 0,
             last_line: 0,
-            decimal_commas,
+            has_decimal_commas,
             is_plain: input_file::is_plain(path)?,
         };
         if !table.read_line()? {
-            return Err(Error::input(
-                Place::file(path),
-                "the file is empty; expected a header line with column names",
-                "copy or export the file again",
-            ));
+            let problem = "the file is empty; expected a header line with column names";
+            return Err(Error::input(Place::file(path), problem, "copy or export the file again"));
         }
-        table.header = table.record.iter().map(header_name).collect();
+        let name = |field| String::from_utf8_lossy(field).trim().trim_start_matches('\u{feff}').to_owned();
+        table.header = table.record.iter().map(name).collect();
         table.check_header()?;
         Ok(table)
     }
@@ -120,20 +119,7 @@ impl CsvTable {
         if !self.read_line()? {
             return Ok(false);
         }
-        if self.record.len() != self.header.len() {
-            return Err(self.wrong_field_count());
-        }
-        Ok(true)
-    }
-
-    /// The column names.
-    pub(super) fn header(&self) -> &[String] {
-        &self.header
-    }
-
-    /// Whether numbers have commas in place of points.
-    pub(super) fn has_decimal_commas(&self) -> bool {
-        self.decimal_commas
+        if self.record.len() == self.header.len() { Ok(true) } else { Err(self.wrong_field_count()) }
     }
 
     /// The column with this name.
@@ -144,11 +130,9 @@ impl CsvTable {
         self.optional_column(name)?.ok_or_else(|| {
             let strange: Vec<String> = self.strange_names().take(10).map(quoted).collect();
             let more = if self.strange_names().count() > strange.len() { ", …" } else { "" };
-            let others = match strange.is_empty() {
-                true => String::new(),
-                false => {
-                    format!("; the header has names that are not part of the format: {}{more}", strange.join(", "))
-                }
+            let others = match strange.join(", ") {
+                none if none.is_empty() => String::new(),
+                names => format!("; the header has names that are not part of the format: {names}{more}"),
             };
             let help = match self.similar_name(name) {
                 Some(similar) => format!("rename the column `{similar}` to `{name}`, if that is what it holds"),
@@ -294,9 +278,7 @@ impl CsvTable {
             }
             // The reader is on the line after the record, unless the record has no line end.
             let end_line = self.reader.position().line().saturating_sub(u64::from(!self.ends_open()));
-            let spans_lines = end_line > self.last_line + 1;
-            self.line = if spans_lines { end_line.saturating_sub(self.inner_line_ends()) } else { end_line };
-            self.last_line = end_line;
+            (self.line, self.last_line) = (end_line.saturating_sub(self.inner_line_ends()), end_line);
             if self.record.len() != 1 || !self.record[0].trim_ascii().is_empty() {
                 return Ok(true);
             }
@@ -305,7 +287,7 @@ impl CsvTable {
 
     fn unreadable(&self, error: csv::Error) -> Error {
         match error.into_kind() {
-            csv::ErrorKind::Io(_) if self.reader.get_ref().is_endless => Error::input(
+            csv::ErrorKind::Io(source) if source.kind() == IS_ENDLESS => Error::input(
                 Place::file(&self.path).row(self.last_line + 1),
                 format!("neither line nor quotation ends here within {} MiB", MAX_LINE_BYTES >> 20),
                 "remove an open quotation mark, or copy or export the file again",
@@ -334,26 +316,22 @@ impl CsvTable {
 
     fn check_header(&self) -> Result<()> {
         let is_other = |separator: &&char| matches!(&self.header[..], [only] if only.contains(**separator));
-        let (problem, help) = if self.record.iter().any(|field| field.contains(&0)) {
+        let refused = |problem: &str, help: &str| Err(Error::input(self.header_place(), problem, help));
+        if self.record.iter().any(|field| field.contains(&0)) {
             let problem = "the header contains zero bytes; expected UTF-8 text with comma-separated column names";
-            (problem.to_owned(), "save the file as UTF-8 (it may be UTF-16) or export it again")
-        } else if let Some(separator) = [';', '\t'].iter().find(is_other) {
-            let help = "export the file with commas between the fields and points in the numbers";
-            (format!("the fields are separated by {separator:?}; expected commas"), help)
-        } else {
-            return Ok(());
-        };
-        Err(Error::input(self.header_place(), problem, help))
+            return refused(problem, "save the file as UTF-8 (it may be UTF-16) or export it again");
+        }
+        let Some(separator) = [';', '\t'].iter().find(is_other) else { return Ok(()) };
+        let problem = format!("the fields are separated by {separator:?}; expected commas");
+        refused(&problem, "export the file with commas between the fields and points in the numbers")
     }
 
     fn wrong_field_count(&mut self) -> Error {
         let (place, found, expected) = (self.place(), self.record.len(), self.header.len());
         let has_open_quote = self.inner_line_ends() > 0;
         let (more, help) = if has_open_quote {
-            (
-                ": a quotation mark is opened and not closed on this line",
-                "remove the quotation mark; the format needs none",
-            )
+            let help = "remove the quotation mark; the format needs none";
+            (": a quotation mark is opened and not closed on this line", help)
         } else if found > expected {
             ("", "remove the surplus fields (a comma inside a number counts as a separator)")
         } else if self.ends_open() || matches!(self.reader.read_byte_record(&mut self.record), Ok(false)) {
@@ -375,11 +353,6 @@ impl CsvTable {
     }
 }
 
-/// A header field as a column name.
-fn header_name(field: &[u8]) -> String {
-    String::from_utf8_lossy(field).trim().trim_start_matches('\u{feff}').to_owned()
-}
-
 /// Text of a user's file in messages: quoted, without control characters, truncated.
 pub(super) fn quoted(text: &str) -> String {
     const SHOWN: usize = 40;
@@ -388,27 +361,26 @@ pub(super) fn quoted(text: &str) -> String {
 }
 
 /// Hashes and counts the bytes read, so that no file is read twice.
-struct HashingReader<R> {
-    inner: R,
+struct HashingReader {
+    inner: Box<dyn Read + Send>,
     hash: Sha256,
     bytes: u64,
     at_end: bool,
     /// Offset of the present line, bytes.
     line_from: u64,
-    /// That line is too long.
-    is_endless: bool,
 }
 
-impl<R: Read> Read for HashingReader<R> {
+/// Kind of the error for a line that is too long.
+const IS_ENDLESS: io::ErrorKind = io::ErrorKind::OutOfMemory;
+
+impl Read for HashingReader {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         // The line has no end so far, and memory would have to hold all of it.
         if self.bytes - self.line_from.min(self.bytes) > MAX_LINE_BYTES {
-            self.is_endless = true;
-            return Err(io::Error::from(io::ErrorKind::InvalidData));
+            return Err(IS_ENDLESS.into());
         }
         let count = self.inner.read(buffer)?;
-        let read = &buffer[..count];
-        self.hash.update(read);
+        self.hash.update(&buffer[..count]);
         self.bytes += count as u64;
         self.at_end = count == 0;
         Ok(count)

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::highd::{self, HighdFiles};
 use super::recording::Loaded;
-use super::tracks::{self, HIGHD, LoadedTracks, Preset, TrackFile, Understanding};
+use super::tracks::{self, HIGHD, Preset, TrackFile, Understanding};
 use lanesweep_model::plausibility::Implausible;
 use lanesweep_support::atomic_file::folder_of;
 use lanesweep_support::files::{file_name, files_of};
@@ -14,10 +14,11 @@ use lanesweep_support::{Error, Place, Result, option};
 /// Recordings whose format is known: highD's, or that of a preset.
 #[derive(Debug, Default)]
 pub struct Inputs {
-    files: Vec<InputFile>,
+    pub(crate) files: Vec<InputFile>,
     /// What is wrong with recordings, or with other files that could be tracks.
     problems: Vec<Error>,
-    preset: Option<Preset>,
+    /// `None` for highD's format.
+    pub preset: Option<Preset>,
 }
 
 /// One file of recordings.
@@ -57,13 +58,12 @@ impl Inputs {
             };
         }
         let Some(first) = first_track_file(path)? else { return nothing_in(path) };
+        let is_highd = is_highd_name(&first);
         let inputs = match tracks::detect(&first) {
-            Ok(Some(preset)) if !(preset.is_generic() && is_highd_name(&first)) => with(preset),
+            Ok(Some(preset)) if !(preset.is_generic() && is_highd) => with(preset),
             // Its reader says what is wrong.
-            _ if is_highd_name(&first) => highd_inputs(path),
-            Ok(Some(preset)) => with(preset),
-            Ok(None) => Err(unknown(&first)),
-            Err(error) => Err(error),
+            _ if is_highd => highd_inputs(path),
+            found => Err(found.err().unwrap_or_else(|| unknown(&first))),
         };
         inputs?.with_others(path)
     }
@@ -71,7 +71,7 @@ impl Inputs {
     /// Leaves out files of a folder that are no tracks. Names those that could be tracks: files of another preset, compressed
     /// files, and files that do not fit or cannot be opened although they have the ending of those that are read.
     fn with_others(mut self, folder: &Path) -> Result<Inputs> {
-        let own = self.preset().map(|preset| preset.name.clone());
+        let own = self.preset.as_ref().map(|preset| preset.name.clone());
         let mut endings: Vec<String> = own.is_none().then(|| "csv".to_owned()).into_iter().collect();
         let mut foreign = Vec::new();
         for file in files_of(folder)? {
@@ -84,7 +84,7 @@ impl Inputs {
             if is_highd && file.to_str().is_none() {
                 self.problems.push(Error::input(Place::file(&file), "its name is not UTF-8", "rename it"));
             }
-            let is_meta = self.preset().is_some_and(|preset| tracks::is_meta(&name, preset));
+            let is_meta = self.preset.as_ref().is_some_and(|preset| tracks::is_meta(&name, preset));
             if is_highd || is_meta || !tracks::may_hold_tracks(&file) {
                 continue;
             }
@@ -110,16 +110,6 @@ impl Inputs {
         Ok(self)
     }
 
-    /// The preset; `None` for highD's format.
-    pub fn preset(&self) -> Option<&Preset> {
-        self.preset.as_ref()
-    }
-
-    /// Number of files of recordings.
-    pub(crate) fn count(&self) -> usize {
-        self.files.len()
-    }
-
     /// The files, and what is wrong with others.
     pub fn files(self) -> (Vec<InputFile>, Vec<Error>) {
         (self.files, self.problems)
@@ -131,7 +121,7 @@ impl InputFile {
     ///
     /// # Errors
     /// As [`highd::read_checked`] and [`tracks::read_tracks`].
-    pub fn understand(&self, implausible: Implausible) -> Result<Vec<LoadedTracks>> {
+    pub fn understand(&self, implausible: Implausible) -> Result<Vec<Loaded>> {
         match self {
             InputFile::Highd(files) => {
                 let loaded = highd::read_checked(files, implausible)?;
@@ -146,21 +136,19 @@ impl InputFile {
     /// # Errors
     /// As [`InputFile::understand`]; [`Error::Input`] for a grave finding, unless implausible input is accepted.
     pub fn read(&self, implausible: Implausible) -> Result<Vec<Loaded>> {
-        let mut usable = Vec::new();
-        for LoadedTracks { mut loaded, understanding } in self.understand(implausible)? {
-            if let Some(grave) = understanding.findings.iter().find(|finding| finding.is_grave)
+        let mut usable = self.understand(implausible)?;
+        for loaded in &mut usable {
+            let findings = std::mem::take(&mut loaded.understanding.findings);
+            if let Some(grave) = findings.iter().find(|finding| finding.is_grave)
                 && implausible == Implausible::Refused
             {
                 let place = Place::file(self.paths()[0]).of(format!("recording {}", loaded.recording.id));
                 let format = if matches!(self, InputFile::Highd(_)) { HIGHD_HELP } else { "" };
-                let help = format!(
-                    "`lanesweep tracks` shows all; {} uses the tracks as they are{format}",
-                    option("accept_implausible")
-                );
+                let accept = option("accept_implausible");
+                let help = format!("`lanesweep tracks` shows all; {accept} uses the tracks as they are{format}");
                 return Err(Error::input(place, grave.text.clone(), help));
             }
-            loaded.notes.extend(understanding.findings.into_iter().map(|finding| finding.text));
-            usable.push(loaded);
+            loaded.notes.extend(findings.into_iter().map(|finding| finding.text));
         }
         Ok(usable)
     }
@@ -251,25 +239,20 @@ fn unknown(path: &Path) -> Error {
             "give recordings; a scenario file is a .jsonl file, and OpenSCENARIO is written by `simulate`, not read";
         return Error::input(Place::file(path), "an OpenSCENARIO file is no recording", help);
     }
-    let columns = match tracks::columns_of(path) {
-        Ok(columns) => {
-            let geographic = columns.iter().filter(|name| is_geographic(name));
-            let geographic: Vec<String> = geographic.map(|name| format!("`{name}`")).collect();
-            if geographic.len() >= 2 {
-                let problem = format!("positions are longitudes and latitudes ({})", geographic.join(", "));
-                let help = "project the positions to metres (UTM, for instance) and name the columns x and y";
-                return Error::input(Place::file(path), problem, help);
-            }
-            let names: Vec<String> = columns.iter().take(30).map(|name| format!("`{name}`")).collect();
-            format!("; its columns are {}", names.join(", "))
-        }
+    let columns: Vec<String> = match tracks::columns_of(path) {
+        Ok(columns) => columns.iter().map(|name| format!("`{name}`")).collect(),
         Err(error) => return error,
     };
-    Error::input(
-        Place::file(path),
-        format!("no preset fits this file{columns}"),
-        format!("name a preset by {}, or rename the columns as in the preset `generic`", option("preset")),
-    )
+    let geographic: Vec<&str> = columns.iter().map(String::as_str).filter(|name| is_geographic(name)).collect();
+    let (problem, help) = if geographic.len() >= 2 {
+        let help = "project the positions to metres (UTM, for instance) and name the columns x and y".to_owned();
+        (format!("positions are longitudes and latitudes ({})", geographic.join(", ")), help)
+    } else {
+        let names = columns[..columns.len().min(30)].join(", ");
+        let help = format!("name a preset by {}, or rename the columns as in the preset `generic`", option("preset"));
+        (format!("no preset fits this file; its columns are {names}"), help)
+    };
+    Error::input(Place::file(path), problem, help)
 }
 
 /// Whether a name is that of a column of longitudes or latitudes.

@@ -12,7 +12,6 @@ mod inputs;
 mod motion;
 mod noise;
 mod number;
-mod overlap;
 mod recording;
 pub mod tracks;
 

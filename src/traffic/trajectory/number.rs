@@ -79,18 +79,9 @@ pub(super) fn push_hundredths(line: &mut Vec<u8>, value: f64) {
     line.extend([b'.', b'0' + (count / 10 % 10) as u8, b'0' + (count % 10) as u8]);
 }
 
-/// Appends a whole number. Own code, because a recording has millions of them.
-pub(super) fn push_integer(line: &mut Vec<u8>, value: u64) {
-    let (mut digits, mut at, mut rest) = ([0u8; 20], 20, value);
-    loop {
-        at -= 1;
-        digits[at] = b'0' + (rest % 10) as u8;
-        rest /= 10;
-        if rest == 0 {
-            break;
-        }
-    }
-    line.extend_from_slice(&digits[at..]);
+/// Appends a whole number; a recording has millions of them.
+pub(super) fn push_integer(line: &mut Vec<u8>, value: impl itoa::Integer) {
+    line.extend_from_slice(itoa::Buffer::new().format(value).as_bytes());
 }
 
 /// Nearest number of hundredths of `value`; an integer has no negative zero.

@@ -9,7 +9,8 @@
 use std::collections::BTreeMap;
 
 use super::csv_table::FileChecksum;
-use lanesweep_support::settings;
+use super::tracks::Understanding;
+use lanesweep_support::config_tables;
 
 /// One recording: a stretch of road over a period of time.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,6 +40,8 @@ pub struct Loaded {
     pub vehicle_names: BTreeMap<u32, String>,
     /// The frame of the file at frame 0 of the recording, and frames of the file per frame; `None` if they are the same.
     pub file_frames: Option<[i64; 2]>,
+    /// What was understood of them; empty before the checks.
+    pub understanding: Understanding,
 }
 
 /// One direction of travel with its lanes.
@@ -55,6 +58,11 @@ impl Carriageway {
     /// Number of lanes.
     pub fn lane_count(&self) -> usize {
         self.lane_lines_m.len().saturating_sub(1)
+    }
+
+    /// Widths of the lanes from left to right, m.
+    pub(crate) fn widths_m(&self) -> impl Iterator<Item = f64> {
+        self.lane_lines_m.windows(2).map(|lines| lines[0] - lines[1])
     }
 
     /// Left and right line of a lane; `None` beyond the carriageway.
@@ -169,10 +177,9 @@ impl Recording {
 /// would give other scenarios.
 pub(crate) const LIMIT_TOLERANCE_M: f64 = 1e-6;
 
-settings! {
+config_tables! {
     /// Extent of an ego-centric view.
-    #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
-    #[serde(default, deny_unknown_fields)]
+    #[derive(Copy)]
     pub struct EgoViewOptions {
         /// Farthest along-road distance, centre to centre, at which another vehicle is in view, m. Paper: 100.
         #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e3))]

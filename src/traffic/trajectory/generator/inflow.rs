@@ -31,9 +31,8 @@ pub(super) struct LaneDemand {
     car_speed_mps: f64,
     /// Overreaction of its drivers.
     overreaction: f64,
-    /// Index, centre and width of the lane.
+    /// Index and width of the lane.
     lane: usize,
-    centre_m: f64,
     lane_width_m: f64,
 }
 
@@ -62,7 +61,6 @@ pub(super) fn demand(
                 car_speed_mps: speeds[lane] * speed_level * options.behaviour.car_speed_factor,
                 overreaction: options.behaviour.overreaction,
                 lane,
-                centre_m: centre_of(lane, lane_width_m),
                 lane_width_m,
             }
         })
@@ -135,6 +133,7 @@ fn draw(demand: &LaneDemand, stream: &mut TrafficRandom) -> Vehicle {
     let mut vehicle = Vehicle::draw(class, demand.car_speed_mps, demand.overreaction, stream);
     vehicle.lane = demand.lane;
     vehicle.occupied = 1 << demand.lane;
-    vehicle.line_m = draw_line(demand.centre_m, demand.lane_width_m, vehicle.width_m, stream);
+    let (lane_m, width_m) = (demand.lane_width_m, vehicle.width_m);
+    vehicle.line_m = draw_line(centre_of(demand.lane, lane_m), lane_m, width_m, stream);
     vehicle
 }

@@ -79,11 +79,9 @@ pub fn generate(options: &GeneratorOptions) -> Result<Vec<Recording>> {
 pub fn generate_one(options: &GeneratorOptions, index: usize) -> Result<Recording> {
     options.validate()?;
     if index >= options.recordings {
-        return Err(Error::usage(
-            Place::item(format!("generated recording {index}")),
-            format!("the options ask for {} recordings, counted from 0", options.recordings),
-            "raise `recordings` or choose a smaller index",
-        ));
+        let problem = format!("the options ask for {} recordings, counted from 0", options.recordings);
+        let help = "raise `recordings` or choose a smaller index";
+        return Err(Error::usage(Place::item(format!("generated recording {index}")), problem, help));
     }
     recording::record(options, index)
 }

@@ -1,15 +1,10 @@
 //! Options of the synthetic recordings, and the numbers on which the failures of recorded scenarios depend most. The
 //! defaults are those of a study without data.
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use lanesweep_support::{Result, config_tables, ranges};
 
-use lanesweep_support::{Result, ranges, settings};
-
-settings! {
+config_tables! {
     /// Options of the generator. `lanesweep study` without data uses the default.
-    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-    #[serde(default, deny_unknown_fields)]
     pub struct GeneratorOptions {
         /// Seed of every random number. Same seed and options, same bits.
         pub seed: u64 = 20_240_901,
@@ -43,34 +38,13 @@ settings! {
         /// How scenarios arise.
         pub behaviour: Behaviour = Behaviour::default(),
     }
-}
 
-impl GeneratorOptions {
-    /// Checks every option; the error names the first one outside its range.
-    pub(crate) fn validate(&self) -> Result<()> {
-        ranges::check("generator", self)
-    }
-
-    /// Simulation steps per sample: the minimum with a step of at most 0.04 s.
-    pub(super) fn steps_per_sample(&self) -> usize {
-        // The small term keeps 25 Hz at one step although 0.04 is not exact in binary.
-        ((25.0 / self.frame_rate_hz - 1e-9).ceil() as usize).max(1)
-    }
-
-    /// Samples per recording.
-    pub(super) fn samples(&self) -> usize {
-        (self.duration_s * self.frame_rate_hz).round() as usize
-    }
-}
-
-settings! {
     /// How drivers change lanes and brake. Rates and fractions are those at rate factor 1.
     ///
     /// The defaults are fitted to the paper's 36 failure rates of S and to published traffic figures
     /// (`benches/calibrate_generator`, which also prints what other numbers give); four were then moved by hand.
     /// The fit never saw an F1, a claim of the paper or the seed of the default recordings.
-    #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-    #[serde(default, deny_unknown_fields)]
+    #[derive(Copy)]
     pub struct Behaviour {
         /// Factor on the desired speeds of cars.
         #[schemars(range(min = 0.5, max = 1.5))]
@@ -111,5 +85,23 @@ settings! {
         /// deceleration.
         #[schemars(range(min = 0.0, max = 2.0))]
         pub overreaction: f64 = 0.226,
+    }
+}
+
+impl GeneratorOptions {
+    /// Checks every option; the error names the first one outside its range.
+    pub(crate) fn validate(&self) -> Result<()> {
+        ranges::check("generator", self)
+    }
+
+    /// Simulation steps per sample: the minimum with a step of at most 0.04 s.
+    pub(super) fn steps_per_sample(&self) -> usize {
+        // The small term keeps 25 Hz at one step although 0.04 is not exact in binary.
+        ((25.0 / self.frame_rate_hz - 1e-9).ceil() as usize).max(1)
+    }
+
+    /// Samples per recording.
+    pub(super) fn samples(&self) -> usize {
+        (self.duration_s * self.frame_rate_hz).round() as usize
     }
 }

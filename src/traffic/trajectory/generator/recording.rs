@@ -30,7 +30,7 @@ pub(super) fn record(options: &GeneratorOptions, index: usize) -> Result<Recordi
         seen.extend(traffic.run().into_iter().map(|vehicle| (carriageway, vehicle)));
     }
     // Numbers ascend by first appearance; the sort is stable, so ties keep carriageway and arrival.
-    seen.sort_by_key(|(_, vehicle)| vehicle.samples.first);
+    seen.sort_by_key(|(_, vehicle)| vehicle.samples.first_frame);
 
     let carriageways = carriageways(road, lane_width_m);
     let tracks = seen
@@ -69,20 +69,11 @@ fn track(id: u32, carriageway: usize, carriageways: &[Carriageway], window_m: f6
     // highD's x runs with carriageway 2 and against carriageway 1, whose s therefore ends at 0.
     let start_m = if carriageway == 0 { -window_m } else { 0.0 };
     let left_m = carriageways[carriageway].lane_lines_m[0];
-    let samples = vehicle.samples;
-    let n = samples.s_m.len();
-    Track {
-        id,
-        class: vehicle.class,
-        length_m: vehicle.length_m,
-        width_m: vehicle.width_m,
-        carriageway,
-        first_frame: samples.first as i64 + 1,
-        s_m: samples.s_m.iter().map(|s| start_m + s).collect(),
-        d_m: samples.d_m.iter().map(|d| left_m + d).collect(),
-        v_s_mps: samples.v_s_mps,
-        v_d_mps: samples.v_d_mps,
-        a_s_mps2: samples.a_s_mps2,
-        lane: vec![NO_LANE; n], // by `label_lanes`, from the rounded positions
-    }
+    let Vehicle { class, length_m, width_m, samples: mut track, .. } = vehicle;
+    track.s_m.iter_mut().for_each(|s_m| *s_m += start_m);
+    track.d_m.iter_mut().for_each(|d_m| *d_m += left_m);
+    let first_frame = track.first_frame + 1;
+    // `label_lanes` sets the lanes, by the rounded positions.
+    let lane = vec![NO_LANE; track.len()];
+    Track { id, class, length_m, width_m, carriageway, first_frame, lane, ..track }
 }

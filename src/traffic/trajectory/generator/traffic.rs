@@ -18,12 +18,6 @@ const SETTLE_S: f64 = 4.0;
 /// power.
 const CROWDING: f64 = 1.56;
 
-/// Factors on the hazards of brakings and of lane changes that raise both rates by `factor`.
-fn raised(factor: f64) -> [f64; 2] {
-    // There is no crowding below the published rates.
-    [factor, if factor > 1.0 { libm::pow(factor, CROWDING) } else { factor }]
-}
-
 /// Road before the camera's view, m. Followers need this distance to settle behind their leaders. On a longer road,
 /// vehicles would be sorted by speed before they enter the view.
 const UPSTREAM_M: f64 = 350.0;
@@ -94,6 +88,7 @@ impl<'a> Traffic<'a> {
         let inflows = demand.into_iter().map(|demand| Inflow::new(demand, &mut arrivals)).collect();
         let dt = 1.0 / (options.frame_rate_hz * options.steps_per_sample() as f64);
         let keep = libm::exp(-dt / NOISE_CORRELATION_S);
+        let raised = options.event_rate_factor;
         Traffic {
             lanes,
             vehicles: Vec::new(),
@@ -109,7 +104,8 @@ impl<'a> Traffic<'a> {
             lag: 1.0 - libm::exp(-dt / ACTUATION_LAG_S),
             perception: 1.0 - libm::exp(-dt / PERCEPTION_S),
             relaxation: 1.0 - libm::exp(-dt / RELAXATION_S),
-            hazards_in_view: raised(options.event_rate_factor),
+            // There is no crowding below the published rates.
+            hazards_in_view: [raised, if raised > 1.0 { libm::pow(raised, CROWDING) } else { raised }],
             options,
             lane_width_m,
             step_s: dt,
@@ -133,7 +129,7 @@ impl<'a> Traffic<'a> {
             let sample = since.filter(|s| s.is_multiple_of(steps_per_sample));
             self.advance(sample.map(|s| s / steps_per_sample));
         }
-        self.vehicles.retain(|vehicle| !vehicle.samples.s_m.is_empty());
+        self.vehicles.retain(|vehicle| !vehicle.samples.is_empty());
         self.vehicles
     }
 
@@ -268,8 +264,8 @@ impl<'a> Traffic<'a> {
                 && (0.0..=self.options.window_m).contains(&own.s_m)
             {
                 let samples = &mut own.samples;
-                if samples.s_m.is_empty() {
-                    samples.first = sample;
+                if samples.is_empty() {
+                    samples.first_frame = sample as i64;
                 }
                 samples.s_m.push(own.s_m);
                 samples.d_m.push(d_m);

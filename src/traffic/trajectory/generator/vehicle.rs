@@ -4,7 +4,7 @@ use super::braking::Braking;
 use super::idm::DriverParameters;
 use super::lateral::{LaneChangeMotion, Wander};
 use super::random::TrafficRandom;
-use crate::trajectory::VehicleClass;
+use crate::trajectory::{Track, VehicleClass};
 
 /// Standard deviation of the drivers' lateral positions in their lane, m.
 const LINE_SD_M: f64 = 0.18;
@@ -12,23 +12,6 @@ const LINE_SD_M: f64 = 0.18;
 /// Lateral position of a lane's centre: the leftmost line is 0, left is positive.
 pub(super) fn centre_of(lane: usize, lane_width_m: f64) -> f64 {
     -(lane as f64 + 0.5) * lane_width_m
-}
-
-/// The camera's samples of a vehicle.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Samples {
-    /// Number of the first sample, from 0.
-    pub first: usize,
-    /// Along the road from the start of the camera's view, m.
-    pub s_m: Vec<f64>,
-    /// Lateral position to the left of the leftmost line, m (negative on the road).
-    pub d_m: Vec<f64>,
-    /// Speed along the road, m/s.
-    pub v_s_mps: Vec<f64>,
-    /// Lateral speed to the left, m/s.
-    pub v_d_mps: Vec<f64>,
-    /// Acceleration along the road, m/s².
-    pub a_s_mps2: Vec<f64>,
 }
 
 /// A vehicle with its driver.
@@ -72,8 +55,8 @@ pub(super) struct Vehicle {
     pub braking: Option<Braking>,
     /// Time until the next lane change is possible, s.
     pub settle_s: f64,
-    /// Samples of the camera.
-    pub samples: Samples,
+    /// The camera's samples, by number: along the road from the start of its view, and to the left of the leftmost line.
+    pub samples: Track,
 }
 
 impl Vehicle {

@@ -16,11 +16,6 @@ impl Direction {
     /// Both, in the order of their numbers.
     pub(super) const BOTH: [Direction; 2] = [Direction::Upper, Direction::Lower];
 
-    /// From `drivingDirection`.
-    pub(super) fn from_number(number: i64) -> Option<Self> {
-        Direction::BOTH.into_iter().find(|direction| *direction as i64 + 1 == number)
-    }
-
     /// As `drivingDirection` and as the carriageway's name.
     pub(super) fn name(self) -> &'static str {
         ["1", "2"][self as usize]

@@ -77,11 +77,9 @@ pub fn inventory(dir: &Path) -> Result<Inventory> {
             continue;
         }
         let (missing, are) = (missing.join(" and "), if missing.len() == 1 { "is" } else { "are" });
-        inventory.problems.push(Error::input(
-            Place::file(dir).of(format!("recording `{id}`")),
-            format!("{missing} {are} missing; a recording consists of {}", names.join(", ")),
-            "add what is missing, or remove the other files of this recording",
-        ));
+        let problem = format!("{missing} {are} missing; a recording consists of {}", names.join(", "));
+        let help = "add what is missing, or remove the other files of this recording";
+        inventory.problems.push(Error::input(Place::file(dir).of(format!("recording `{id}`")), problem, help));
     }
     if inventory.recordings.is_empty() {
         return Err(nothing_complete(dir, inventory.problems));
@@ -103,11 +101,8 @@ pub(crate) fn made_up(dir: &Path) -> Option<String> {
 fn prefixes(dir: &Path) -> Result<BTreeMap<String, [bool; 3]>> {
     let facts = fs::metadata(dir).map_err(|source| Error::io(dir, "read the folder", source))?;
     if !facts.is_dir() {
-        return Err(Error::input(
-            Place::file(dir),
-            "this is a file; expected a folder with recordings",
-            "name the folder that holds the files NN_tracks.csv, NN_tracksMeta.csv, NN_recordingMeta.csv",
-        ));
+        let help = "name the folder that holds the files NN_tracks.csv, NN_tracksMeta.csv, NN_recordingMeta.csv";
+        return Err(Error::input(Place::file(dir), "this is a file; expected a folder with recordings", help));
     }
     let mut found: BTreeMap<String, [bool; 3]> = BTreeMap::new();
     for path in files_of(dir)?.iter().filter(|path| !path.is_symlink() || path.exists()) {
@@ -127,18 +122,20 @@ fn prefixes(dir: &Path) -> Result<BTreeMap<String, [bool; 3]>> {
 fn nothing_complete(dir: &Path, mut problems: Vec<Error>) -> Error {
     match problems.len() {
         0 => {
-            let inner: Vec<String> =
-                subfolders_with_recordings(dir).iter().map(|of| of.display().to_string()).collect();
+            // The highD archive unpacks into `data/`, and simulations have a folder for each run.
+            let has_tracks =
+                |folder: &PathBuf| files_of(folder).is_ok_and(|all| all.iter().any(|of| may_hold_tracks(of)));
+            let listed = fs::read_dir(dir).into_iter().flatten().flatten().map(|entry| entry.path());
+            let inner = listed.filter(|folder| folder.is_dir()).filter(has_tracks);
+            let mut inner: Vec<String> = inner.map(|of| of.display().to_string()).collect();
+            inner.sort();
             let help = match &inner[..] {
                 [] => "name a folder with highD-format recordings".to_owned(),
                 [inner] => format!("the folder {inner} has recordings: name that one"),
                 several => format!("these folders have recordings, name one of them: {}", several.join(", ")),
             };
-            Error::input(
-                Place::file(dir),
-                "the folder has no recording; expected files NN_tracks.csv, NN_tracksMeta.csv, NN_recordingMeta.csv",
-                help,
-            )
+            let expected = SUFFIXES.map(|suffix| format!("NN{suffix}")).join(", ");
+            Error::input(Place::file(dir), format!("the folder has no recording; expected files {expected}"), help)
         }
         1 => problems.remove(0),
         count => Error::input(
@@ -147,15 +144,4 @@ fn nothing_complete(dir: &Path, mut problems: Vec<Error>) -> Error {
             "every recording needs NN_tracks.csv, NN_tracksMeta.csv and NN_recordingMeta.csv",
         ),
     }
-}
-
-/// The highD archive unpacks into `data/`, and simulations have a folder for each run, so users often name the outer one.
-fn subfolders_with_recordings(dir: &Path) -> Vec<PathBuf> {
-    let listed = fs::read_dir(dir).into_iter().flatten().flatten().map(|entry| entry.path());
-    let is_such = |folder: &PathBuf| {
-        folder.is_dir() && files_of(folder).is_ok_and(|all| all.iter().any(|of| may_hold_tracks(of)))
-    };
-    let mut folders: Vec<PathBuf> = listed.filter(is_such).collect();
-    folders.sort();
-    folders
 }

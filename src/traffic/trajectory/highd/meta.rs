@@ -58,20 +58,16 @@ pub(super) fn read_recording_meta(files: &HighdFiles, doubts: &mut Doubts) -> Re
     let lower = markings(&table, lower_column)?;
     let synthetic = synthetic_column.map_or(Ok(false), |column| yes_or_no(&table, column))?;
     if upper.is_empty() && lower.is_empty() {
-        return Err(table.bad(
-            upper_column,
-            "the lane lines are missing, here and in `lowerLaneMarkings`; expected at least two in one of them",
-            MARKINGS_HELP,
-        ));
+        let problem =
+            "the lane lines are missing, here and in `lowerLaneMarkings`; expected at least two in one of them";
+        return Err(table.bad(upper_column, problem, MARKINGS_HELP));
     }
     if let (Some(last_upper), Some(first_lower)) = (upper.last(), lower.first())
         && last_upper > first_lower
     {
-        return Err(table.bad(
-            lower_column,
-            format!("the lower lane lines begin at {first_lower}, above the last of the upper ones at {last_upper}"),
-            "y points down: the upper lane lines must have the smaller values",
-        ));
+        let order = format!("begin at {first_lower}, above the last of the upper ones at {last_upper}");
+        let help = "y points down: the upper lane lines must have the smaller values";
+        return Err(table.bad(lower_column, format!("the lower lane lines {order}"), help));
     }
     check_plausible(&table, frame_rate, Quantity::Rate, frame_rate_hz, doubts)?;
     for (lines, column) in [(&upper, upper_column), (&lower, lower_column)] {
@@ -116,12 +112,9 @@ fn frames_per_second(table: &CsvTable, column: CsvColumn) -> Result<f64> {
     if FRAME_RATES_HZ.contains(&frame_rate_hz) {
         return Ok(frame_rate_hz);
     }
-    let (min, max) = (FRAME_RATES_HZ.start(), FRAME_RATES_HZ.end());
-    Err(table.bad(
-        column,
-        format!("{} is not a frame rate; expected between {min} and {max} frames per second", table.shown(column)),
-        "give the number of frames per second (highD: 25)",
-    ))
+    let (found, min, max) = (table.shown(column), FRAME_RATES_HZ.start(), FRAME_RATES_HZ.end());
+    let problem = format!("{found} is not a frame rate; expected between {min} and {max} frames per second");
+    Err(table.bad(column, problem, "give the number of frames per second (highD: 25)"))
 }
 
 /// Lane lines of the image, from top to bottom, as a carriageway.
@@ -186,10 +179,12 @@ pub(super) fn read_tracks_meta(
     // Stable, so that the error names the later one of two lines with one id.
     vehicles.sort_by_key(|(vehicle, _)| vehicle.track.id);
     if let Some([_, (vehicle, place)]) = vehicles.array_windows().find(|[(a, _), (b, _)]| a.track.id == b.track.id) {
+        let problem = "an earlier line has the same id; expected one line per vehicle";
+        let help = "remove the surplus line, or give the vehicle its own id in both files";
         return Err(Error::input(
             place.clone().column("id").of(format!("vehicle {}", vehicle.track.id)),
-            "an earlier line has the same id; expected one line per vehicle",
-            "remove the surplus line, or give the vehicle its own id in both files",
+            problem,
+            help,
         ));
     }
     Ok((vehicles.into_iter().map(|(vehicle, _)| vehicle).collect(), table.finish()?))
@@ -225,17 +220,16 @@ impl MetaColumns {
         let id = u32::try_from(id).map_err(|_| {
             table.bad(id_column, format!("{id} is not a vehicle id; expected 0 to {}", u32::MAX), "correct the id")
         })?;
-        let direction = Direction::from_number(table.integer(direction_column)?).ok_or_else(|| {
+        let number = table.integer(direction_column)?;
+        let direction = Direction::BOTH.into_iter().find(|of| *of as i64 + 1 == number).ok_or_else(|| {
             let found = table.shown(direction_column);
             let problem = format!("{found} is not a driving direction; expected 1 (upper lanes) or 2 (lower lanes)");
             table.bad(direction_column, problem, "correct the value")
         })?;
         let carriageway = recording.carriageway(direction).ok_or_else(|| {
-            Error::input(
-                recording.place.clone().column(direction.markings_column()),
-                format!("the lane lines are missing, but vehicle {id} drives in direction {}", direction.name()),
-                MARKINGS_HELP,
-            )
+            let place = recording.place.clone().column(direction.markings_column());
+            let driven = format!("vehicle {id} drives in direction {}", direction.name());
+            Error::input(place, format!("the lane lines are missing, but {driven}"), MARKINGS_HELP)
         })?;
         let class = class(table, class_column)?;
         let (length_m, width_m) = (table.positive(length)?, table.positive(width)?);

@@ -1,7 +1,5 @@
 //! Reads one recording's three files into the internal model, in one pass, from the needed columns only.
 
-use std::collections::BTreeMap;
-
 use super::format::{FRAME_LIMIT, TRACKS_HEADER};
 use super::inventory::{HighdFiles, made_up};
 use super::meta::{self, RecordingMeta, VehicleMeta};
@@ -50,7 +48,8 @@ pub fn read_checked(files: &HighdFiles, implausible: Implausible) -> Result<Load
         tracks: vehicles.into_iter().map(|vehicle| vehicle.track).filter(|track| !track.is_empty()).collect(),
         synthetic: meta.synthetic || made_up(folder_of(&files.recording_meta)).is_some(),
     };
-    Ok(Loaded { recording, checksum_sha256, notes, vehicle_names: BTreeMap::new(), file_frames: None })
+    let (vehicle_names, understanding) = Default::default();
+    Ok(Loaded { recording, checksum_sha256, notes, vehicle_names, file_frames: None, understanding })
 }
 
 struct TrackColumns {
@@ -125,11 +124,8 @@ fn find_vehicle(table: &CsvTable, column: CsvColumn, vehicles: &[VehicleMeta], b
         return Ok(at);
     }
     vehicles.binary_search_by_key(&id, |vehicle| i64::from(vehicle.track.id)).map_err(|_| {
-        table.bad(
-            column,
-            format!("vehicle {id} is not in the tracksMeta file"),
-            "add its line there or remove its lines here; check that the files belong to the same recording",
-        )
+        let help = "add its line there or remove its lines here; check that the files belong to the same recording";
+        table.bad(column, format!("vehicle {id} is not in the tracksMeta file"), help)
     })
 }
 
@@ -161,11 +157,9 @@ fn add_sample(
     let s_m = direction.s_of(table.real(x)?, track.length_m);
     let v_s_mps = doubts.speed(direction.forward(table.real(v_x)?), || table.field(v_x).to_string());
     if v_s_mps < 0.0 {
-        return Err(table.bad(
-            v_x,
-            format!("{v_s_mps} m/s along its drivingDirection: vehicle {} drives backwards", track.id),
-            "correct its sign or drivingDirection, or remove the vehicle (noise above -0.5 m/s counts as 0)",
-        ));
+        let problem = format!("{v_s_mps} m/s along its drivingDirection: vehicle {} drives backwards", track.id);
+        let help = "correct its sign or drivingDirection, or remove the vehicle (noise above -0.5 m/s counts as 0)";
+        return Err(table.bad(v_x, problem, help));
     }
     let v_d_mps = direction.leftward(table.real(v_y)?);
     let a_s_mps2 = direction.forward(table.real(a_x)?);
@@ -243,12 +237,8 @@ fn check_counts(table: &CsvTable, vehicles: &[VehicleMeta]) -> Result<()> {
     let is_shifted = |of: &&VehicleMeta| usual.zip(shift(of)).is_some_and(|(usual, own)| usual != own);
     let Some(vehicle) = vehicles.iter().find(is_shifted) else { return Ok(()) };
     let (found, told) = (vehicle.track.first_frame, vehicle.first_frame.unwrap_or_default());
-    bad(
-        vehicle,
-        format!(
-            "the vehicle begins at frame {found}, but the tracksMeta file says {told}, unlike for the first vehicle"
-        ),
-    )
+    let problem = format!("the vehicle begins at frame {found}, but the tracksMeta file says {told}");
+    bad(vehicle, problem + ", unlike for the first vehicle")
 }
 
 /// Sizes of one vehicle that differ by less are rounded, m.

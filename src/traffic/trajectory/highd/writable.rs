@@ -76,10 +76,8 @@ impl ImageLayout {
             let named = Direction::BOTH.into_iter().find(|direction| direction.name() == of.name);
             let item = format!(", carriageway `{}`", of.name);
             let Some(direction) = named.filter(follows) else {
-                return refuse(
-                    item,
-                    "unknown, repeated or out of order: names are `1` (upper lanes) and `2` (lower lanes)",
-                );
+                let problem = "unknown, repeated or out of order: names are `1` (upper lanes) and `2` (lower lanes)";
+                return refuse(item, problem);
             };
             let mut lines: Vec<f64> = of.lane_lines_m.iter().map(|&d| rounded(direction.leftward(d))).collect();
             if direction == Direction::Upper {
@@ -89,10 +87,8 @@ impl ImageLayout {
                 || !(2..=LANE_LINES_LIMIT).contains(&lines.len())
                 || lines.array_windows().any(|[above, below]| above >= below)
             {
-                return refuse(
-                    item,
-                    "its lane lines are not at least two that fall from left to right by 0.01 m and more",
-                );
+                let problem = "its lane lines are not at least two that fall from left to right by 0.01 m and more";
+                return refuse(item, problem);
             }
             lines_y[direction as usize] = lines;
             directions.push(direction);
@@ -130,33 +126,31 @@ fn in_range(value: f64) -> bool {
 
 fn problem(recording: &Recording) -> Option<&'static str> {
     let Recording { id, frame_rate_hz, carriageways, tracks, .. } = recording;
-    if id.is_empty() || id.starts_with('.') || id.contains(['/', '\\', '\0']) {
-        Some("its name cannot begin a file name")
-    } else if !FRAME_RATES_HZ.contains(frame_rate_hz) {
-        Some("its frame rate is not between 0.1 and 10000 Hz")
-    } else if carriageways.is_empty() || tracks.is_empty() {
-        Some("it has no carriageway or no vehicle")
-    } else if tracks.array_windows().any(|[a, b]| a.id >= b.id) {
-        Some("its vehicles are not sorted by id, or two have the same")
-    } else {
-        None
-    }
+    let is_no_name = id.is_empty() || id.starts_with('.') || id.contains(['/', '\\', '\0']);
+    let is_unsorted = tracks.array_windows().any(|[a, b]| a.id >= b.id);
+    first_of([
+        (is_no_name, "its name cannot begin a file name"),
+        (!FRAME_RATES_HZ.contains(frame_rate_hz), "its frame rate is not between 0.1 and 10000 Hz"),
+        (carriageways.is_empty() || tracks.is_empty(), "it has no carriageway or no vehicle"),
+        (is_unsorted, "its vehicles are not sorted by id, or two have the same"),
+    ])
+}
+
+/// The first problem that there is.
+fn first_of<const N: usize>(problems: [(bool, &'static str); N]) -> Option<&'static str> {
+    problems.into_iter().find(|(is_there, _)| *is_there).map(|(_, problem)| problem)
 }
 
 fn track_problem(track: &Track, recording: &Recording) -> Option<&'static str> {
     let series = [&track.s_m, &track.d_m, &track.v_s_mps, &track.v_d_mps, &track.a_s_mps2];
     let size_is_good = |size: f64| in_range(size) && rounded(size) > 0.0;
-    if track.carriageway >= recording.carriageways.len() {
-        Some("it drives on a carriageway that does not exist")
-    } else if !size_is_good(track.length_m) || !size_is_good(track.width_m) {
-        Some("its size is not above zero")
-    } else if track.is_empty() || track.lane.len() != track.len() || series.iter().any(|s| s.len() != track.len()) {
-        Some("its series are empty or of different lengths")
-    } else if !series.iter().all(|series| series.iter().all(|&value| in_range(value))) {
-        Some("a value is not finite or out of range")
-    } else if !(-FRAME_LIMIT..=FRAME_LIMIT).contains(&track.first_frame) {
-        Some("its first frame is out of range")
-    } else {
-        None
-    }
+    let is_uneven = series.iter().any(|series| series.len() != track.len()) || track.lane.len() != track.len();
+    let is_off_range = series.iter().any(|series| series.iter().any(|&value| !in_range(value)));
+    first_of([
+        (track.carriageway >= recording.carriageways.len(), "it drives on a carriageway that does not exist"),
+        (!size_is_good(track.length_m) || !size_is_good(track.width_m), "its size is not above zero"),
+        (track.is_empty() || is_uneven, "its series are empty or of different lengths"),
+        (is_off_range, "a value is not finite or out of range"),
+        (!(-FRAME_LIMIT..=FRAME_LIMIT).contains(&track.first_frame), "its first frame is out of range"),
+    ])
 }

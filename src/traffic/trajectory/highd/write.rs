@@ -10,7 +10,7 @@ use super::inventory::HighdFiles;
 use super::neighbours::{Around, neighbours};
 use super::writable::ImageLayout;
 use crate::trajectory::number::{push_hundredths, push_integer, rounded};
-use crate::trajectory::tracks::central;
+use crate::trajectory::tracks::{central, range};
 use crate::trajectory::{Recording, Track, VehicleClass};
 use lanesweep_support::atomic_file::{AtomicFile, StagedFile};
 use lanesweep_support::{Error, Result};
@@ -46,13 +46,10 @@ pub fn stage(dir: &Path, recording: &Recording) -> Result<[StagedFile; 3]> {
     let layout = ImageLayout::of(recording)?;
     fs::create_dir_all(dir).map_err(|source| Error::io(dir, "create the folder", source))?;
     let files = HighdFiles::named(dir, &recording.id);
-    let mut extent_m = (f64::INFINITY, f64::NEG_INFINITY);
-    for track in &recording.tracks {
-        for centre_m in track.s_m.iter().map(|s_m| layout.directions[track.carriageway].forward(*s_m)) {
-            let half_m = 0.5 * track.length_m;
-            extent_m = (extent_m.0.min(centre_m - half_m), extent_m.1.max(centre_m + half_m));
-        }
-    }
+    let extent_m = range(recording.tracks.iter().flat_map(|track| {
+        let (direction, half_m) = (layout.directions[track.carriageway], 0.5 * track.length_m);
+        track.s_m.iter().map(move |s_m| direction.forward(*s_m)).flat_map(move |at_m| [at_m - half_m, at_m + half_m])
+    }));
     let writer = Writer { recording, layout, extent_m };
     let (tracks, minima) = writer.tracks(&files.tracks)?;
     let tracks_meta = writer.tracks_meta(&files.tracks_meta, &minima)?;
@@ -109,33 +106,34 @@ impl Writer<'_> {
     ) {
         let direction = self.direction(track);
         let (s_m, d_m) = (track.s_m[sample], track.d_m[sample]);
-        line.integer(track.first_frame + sample as i64);
-        line.integer(i64::from(track.id));
-        // The box belongs to the image: its width is the vehicle's length, rounded as a reader sees it.
-        line.number(direction.x_of(s_m, rounded(track.length_m)));
-        line.number(direction.y_of(d_m, rounded(track.width_m)));
-        line.number(track.length_m);
-        line.number(track.width_m);
-        line.number(direction.forward(track.v_s_mps[sample]));
-        line.number(direction.leftward(track.v_d_mps[sample]));
-        line.number(direction.forward(track.a_s_mps2[sample]));
-        line.number(direction.leftward(leftward_mps2));
+        line.integers([track.first_frame + sample as i64, i64::from(track.id)]);
         let (to_left, to_right) = (direction.forward(s_m) - self.extent_m.0, self.extent_m.1 - direction.forward(s_m));
         let (front, back) = match direction {
             Direction::Upper => (to_left, to_right),
             Direction::Lower => (to_right, to_left),
         };
-        line.number(front);
-        line.number(back);
         // What is undefined is 0, as in highD without a preceding vehicle.
         let [dhw_m, thw_s, ttc_s, ahead_mps] = headways.unwrap_or_default();
         let defined = |value: f64| if value.is_finite() { value } else { 0.0 };
-        for value in [dhw_m, defined(thw_s), defined(ttc_s), direction.forward(ahead_mps)] {
-            line.number(value);
-        }
-        for index in around {
-            line.integer(self.recording.tracks.get(*index as usize).map_or(0, |other| i64::from(other.id)));
-        }
+        line.numbers([
+            // The box belongs to the image: its width is the vehicle's length, rounded as a reader sees it.
+            direction.x_of(s_m, rounded(track.length_m)),
+            direction.y_of(d_m, rounded(track.width_m)),
+            track.length_m,
+            track.width_m,
+            direction.forward(track.v_s_mps[sample]),
+            direction.leftward(track.v_d_mps[sample]),
+            direction.forward(track.a_s_mps2[sample]),
+            direction.leftward(leftward_mps2),
+            front,
+            back,
+            dhw_m,
+            defined(thw_s),
+            defined(ttc_s),
+            direction.forward(ahead_mps),
+        ]);
+        let id = |index: u32| self.recording.tracks.get(index as usize).map_or(0, |other| i64::from(other.id));
+        line.integers(around.map(id));
         line.integer(self.layout.lane_id(direction, track.lane[sample], d_m));
     }
 
@@ -154,22 +152,17 @@ impl Writer<'_> {
         let mut line = CsvLine::default();
         for (track, minima) in self.recording.tracks.iter().zip(minima) {
             line.integer(i64::from(track.id));
-            line.number(track.length_m);
-            line.number(track.width_m);
-            line.integer(track.first_frame);
-            line.integer(track.last_frame());
-            line.integer(track.len() as i64);
+            line.numbers([track.length_m, track.width_m]);
+            line.integers([track.first_frame, track.last_frame(), track.len() as i64]);
             line.text(match track.class {
                 VehicleClass::Car => "Car",
                 VehicleClass::Truck => "Truck",
             });
             line.text(self.direction(track).name());
-            line.number(driven_m(track));
-            let speeds = || track.v_s_mps.iter().map(|speed| speed.abs());
-            line.number(speeds().fold(f64::INFINITY, f64::min));
-            line.number(speeds().fold(0.0, f64::max));
-            line.number(speeds().sum::<f64>() / track.len() as f64);
-            minima.iter().for_each(|min| line.number(if min.is_finite() { *min } else { -1.0 }));
+            let (slowest_mps, fastest_mps) = range(track.v_s_mps.iter().map(|speed| speed.abs()));
+            let mean_mps = track.v_s_mps.iter().map(|speed| speed.abs()).sum::<f64>() / track.len() as f64;
+            line.numbers([driven_m(track), slowest_mps, fastest_mps, mean_mps]);
+            line.numbers(minima.map(|min| if min.is_finite() { min } else { -1.0 }));
             line.integer(track.lane.array_windows().filter(|[before, after]| before != after).count() as i64);
             line.end(&mut file)?;
         }
@@ -188,15 +181,12 @@ impl Writer<'_> {
         line.text(&frame_rate_hz.to_string());
         // The location, and no speed limit.
         line.integer(1);
-        line.number(-1.0);
+        line.numbers([-1.0]);
         // Month, day of the week, and time of day.
         ["1.2024", "Mon", "00:00"].into_iter().for_each(|text| line.text(text));
-        line.number(frames(first, last));
-        line.number(tracks.iter().map(driven_m).sum());
-        line.number(tracks.iter().map(|track| frames(track.first_frame, track.last_frame())).sum());
-        line.integer(tracks.len() as i64);
-        line.integer((tracks.len() - trucks) as i64);
-        line.integer(trucks as i64);
+        let driven_s = tracks.iter().map(|track| frames(track.first_frame, track.last_frame())).sum();
+        line.numbers([frames(first, last), tracks.iter().map(driven_m).sum(), driven_s]);
+        line.integers([tracks.len(), tracks.len() - trucks, trucks].map(|count| count as i64));
         self.layout.lines_y.iter().for_each(|lines| line.list(lines));
         let mut header = RECORDING_META_HEADER.trim_end_matches(",synthetic");
         if self.recording.synthetic {
@@ -236,8 +226,8 @@ impl CsvLine {
         &mut self.0
     }
 
-    fn number(&mut self, value: f64) {
-        push_hundredths(self.field(), value);
+    fn numbers<const N: usize>(&mut self, values: [f64; N]) {
+        values.into_iter().for_each(|value| push_hundredths(self.field(), value));
     }
 
     /// Several numbers in one field.
@@ -250,12 +240,12 @@ impl CsvLine {
         field.pop_if(|last| *last == b';');
     }
 
+    fn integers<const N: usize>(&mut self, values: [i64; N]) {
+        values.into_iter().for_each(|value| self.integer(value));
+    }
+
     fn integer(&mut self, value: i64) {
-        let field = self.field();
-        if value < 0 {
-            field.push(b'-');
-        }
-        push_integer(field, value.unsigned_abs());
+        push_integer(self.field(), value);
     }
 
     fn text(&mut self, text: &str) {

@@ -2,7 +2,6 @@
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
-use super::LoadedTracks;
 use super::boxes::{begins_so, centre, is_ignored};
 use super::directions::{Placed, oncoming_left_m, road};
 use super::lanes::{BY_NAME, Lateral, lane_lines};
@@ -31,7 +30,7 @@ fn path(piece: &Piece) -> Path {
 }
 
 /// The recording, and what was understood.
-pub(super) fn assemble(mut raw: RawRecording, preset: &Preset, place: &Place) -> Result<LoadedTracks> {
+pub(super) fn assemble(mut raw: RawRecording, preset: &Preset, place: &Place) -> Result<Loaded> {
     let mut about = Understanding::new(&raw.id);
     about.fact("columns", std::mem::take(&mut raw.columns));
     about.fact("reference", format!("{:?}, as the preset says or assumes", preset.reference).to_lowercase());
@@ -103,8 +102,7 @@ pub(super) fn assemble(mut raw: RawRecording, preset: &Preset, place: &Place) ->
         Recording { id: raw.id, frame_rate_hz: rate_hz, carriageways, tracks, synthetic: raw.synthetic };
     about.judge(&mut recording, preset, place)?;
     let (checksum_sha256, notes) = (raw.checksums, Vec::new());
-    let loaded = Loaded { recording, checksum_sha256, notes, vehicle_names, file_frames };
-    Ok(LoadedTracks { loaded, understanding: about })
+    Ok(Loaded { recording, checksum_sha256, notes, vehicle_names, file_frames, understanding: about })
 }
 
 /// Tells what classes are taken for.

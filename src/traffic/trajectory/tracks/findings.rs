@@ -3,9 +3,9 @@
 use super::offsets::{slope_within, way};
 use super::preset::{Preset, Side};
 use super::road::{median, range};
-use super::understanding::{Understanding, median_of};
+use super::understanding::{Understanding, lengths_m, median_of};
 use crate::trajectory::motion::impossible;
-use crate::trajectory::{NO_LANE, Recording, Track, VehicleClass};
+use crate::trajectory::{Carriageway, NO_LANE, Recording, Track, VehicleClass};
 use lanesweep_model::plausibility::{Doubts, Implausible, NOISE_MPS, Quantity};
 use lanesweep_support::readable::{count, significant, value};
 
@@ -190,17 +190,17 @@ impl Understanding {
                 grave.get_or_insert(format!("{place}: {problem}"));
             }
         };
-        let mean = |track: &Track| track.v_s_mps.iter().map(|v| v.max(0.0)).sum::<f64>() / track.len() as f64;
-        let length_m = |track: &Track| track.length_m;
-        let width_m = |track: &Track| track.width_m;
-        type Value<'a> = &'a dyn Fn(&Track) -> f64;
-        let of_vehicles: [(Quantity, Value); 3] =
-            [(Quantity::Speed, &mean), (Quantity::Length, &length_m), (Quantity::Width, &width_m)];
+        type Value = fn(&Track) -> f64;
+        let of_vehicles: [(Quantity, Value); 3] = [
+            (Quantity::Speed, |of| of.v_s_mps.iter().map(|v| v.max(0.0)).sum::<f64>() / of.len() as f64),
+            (Quantity::Length, |of| of.length_m),
+            (Quantity::Width, |of| of.width_m),
+        ];
         for (quantity, of) in of_vehicles {
             recording.tracks.iter().for_each(|track| check(quantity, of(track), format!("vehicle {}", track.id)));
         }
-        let lanes = recording.carriageways.iter().flat_map(|of| of.lane_lines_m.windows(2));
-        lanes.for_each(|two| check(Quantity::LaneWidth, two[0] - two[1], "a lane".to_owned()));
+        let mut widths_m: Vec<f64> = recording.carriageways.iter().flat_map(Carriageway::widths_m).collect();
+        widths_m.iter().for_each(|width_m| check(Quantity::LaneWidth, *width_m, "a lane".to_owned()));
         check(Quantity::Rate, recording.frame_rate_hz, "frame rate".to_owned());
         for of in &recording.tracks {
             doubts.check_shape(of.length_m, of.width_m, || format!("vehicle {}", of.id));
@@ -216,9 +216,8 @@ impl Understanding {
         }
         self.check_sizes(recording);
         let length_of = |class: VehicleClass| {
-            let mut lengths: Vec<f64> =
-                recording.tracks.iter().filter(|of| of.class == class).map(|of| of.length_m).collect();
-            (lengths.len() >= MIN_VEHICLES).then(|| median(&mut lengths))
+            let mut lengths_m = lengths_m(recording, class);
+            (lengths_m.len() >= MIN_VEHICLES).then(|| median(&mut lengths_m))
         };
         if let Some((car_m, lorry_m)) = length_of(VehicleClass::Car).zip(length_of(VehicleClass::Truck))
             && lorry_m <= car_m
@@ -228,11 +227,6 @@ impl Understanding {
                 "lorries of {lorry_m} m are not longer than cars of {car_m} m: check classes and lengths"
             ));
         }
-        let mut widths_m: Vec<f64> = recording
-            .carriageways
-            .iter()
-            .flat_map(|of| of.lane_lines_m.windows(2).map(|two| two[0] - two[1]))
-            .collect();
         let lane_m = median(&mut widths_m);
         if Quantity::LaneWidth.is_plausible(lane_m) && !USUAL_LANES_M.contains(&lane_m) {
             let (lane_m, (least, most)) = (significant(lane_m, 3), (USUAL_LANES_M.start(), USUAL_LANES_M.end()));
@@ -240,8 +234,8 @@ impl Understanding {
                 "lanes are {lane_m} m wide (median; {least} to {most} is usual): check the scale of positions, which Web Mercator stretches by the inverse cosine of the latitude"
             ));
         }
-        let is_no_lane = |two: &[f64]| !Quantity::LaneWidth.is_plausible(two[0] - two[1]);
-        if recording.carriageways.iter().any(|of| of.lane_lines_m.windows(2).all(is_no_lane)) {
+        let is_no_lane = |width_m| !Quantity::LaneWidth.is_plausible(width_m);
+        if recording.carriageways.iter().any(|of| of.widths_m().all(is_no_lane)) {
             self.refuse("no lane has a plausible width: check the unit of y, and what `lane` means");
         }
         let lanes = || recording.tracks.iter().flat_map(|track| &track.lane);
@@ -321,17 +315,17 @@ impl Understanding {
                 "vehicles move {times} times as far across the road as their lateral speeds tell: check the unit of y and the width of lanes"
             ));
         }
-        if let Some((cosine, across)) = heading {
-            if cosine < 0.9 {
-                self.refuse(format!(
-                    "headings and motion differ (median cosine {}): check the unit of the heading, and `axes.heading` (from-x or from-north)",
-                    significant(cosine, 2)
-                ));
-            } else if across.slope() < -0.3 && across.correlation() < -0.3 && across.is_opposite() {
-                self.refuse(
-                    "headings turn against the motion across the road: y, or the heading, is mirrored; see `axes.y`",
-                );
+        match heading {
+            Some((cosine, _)) if cosine < 0.9 => {
+                let cosine = significant(cosine, 2);
+                self.refuse(format!("headings and motion differ (median cosine {cosine}): check the unit of the heading, and `axes.heading` (from-x or from-north)"));
             }
+            Some((_, across)) if across.slope() < -0.3 && across.correlation() < -0.3 && across.is_opposite() => {
+                let text =
+                    "headings turn against the motion across the road: y, or the heading, is mirrored; see `axes.y`";
+                self.refuse(text);
+            }
+            _ => (),
         }
         let is_left = preset.traffic == Side::Left;
         match self.seen.oncoming_left_m {

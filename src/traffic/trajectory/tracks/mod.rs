@@ -39,8 +39,7 @@ use rows::{Columns, Rows};
 use super::Loaded;
 use super::highd::made_up;
 use lanesweep_support::atomic_file::folder_of;
-use lanesweep_support::files::file_name;
-use lanesweep_support::files::files_of;
+use lanesweep_support::files::{file_name, files_of};
 use lanesweep_support::input_file::unpacked;
 use lanesweep_support::{Error, Place, Result, option};
 
@@ -89,7 +88,7 @@ pub fn detect(path: &Path) -> Result<Option<Preset>> {
     let usual = Preset::load("generic")?;
     let mut best: Vec<(usize, Preset)> = Vec::new();
     for preset in Preset::shipped()?.into_iter().filter(|preset| preset.recording_of(unpacked(&name)).is_some()) {
-        let score = fitting(&preset, &usual, rows.header());
+        let score = fitting(&preset, &usual, &rows.header);
         best.extend((score > 0).then_some((score, preset)));
     }
     best.sort_by_key(|(score, _)| std::cmp::Reverse(*score));
@@ -156,20 +155,11 @@ pub(super) fn is_meta(name: &str, preset: &Preset) -> bool {
     preset.vehicles.iter().chain(&preset.recording).any(fits)
 }
 
-/// A recording of a track file, and what was understood.
-#[derive(Debug)]
-pub struct LoadedTracks {
-    /// The recording with the facts about its file.
-    pub loaded: Loaded,
-    /// What was understood.
-    pub understanding: Understanding,
-}
-
 /// Reads a track file; returns its recordings. Contradictions are in their findings.
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Input`] for a value that is none, with file, row and column, or for a file without vehicles.
-pub fn read_tracks(file: &TrackFile, preset: &Preset) -> Result<Vec<LoadedTracks>> {
+pub fn read_tracks(file: &TrackFile, preset: &Preset) -> Result<Vec<Loaded>> {
     let recordings = raw::read_table(file, preset)?;
     let place = Place::file(&file.path);
     if recordings.iter().all(|recording| recording.vehicles.is_empty()) {
@@ -190,7 +180,7 @@ pub fn read_tracks(file: &TrackFile, preset: &Preset) -> Result<Vec<LoadedTracks
 /// Those of the file; [`Error::Input`] for a file whose format is unknown.
 pub(super) fn columns_of(path: &Path) -> Result<Vec<String>> {
     if may_hold_tracks(path) {
-        return Ok(Rows::open(path)?.header().to_vec());
+        return Ok(Rows::open(path)?.header);
     }
     let (problem, help) = match ending(&file_name(path)).as_deref() {
         Some("xml") => ("XML is not read", "make a table in Python: `lanesweep.tracks.sumo`, or `commonroad`"),

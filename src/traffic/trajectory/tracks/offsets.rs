@@ -1,13 +1,12 @@
 //! Boxes: their sizes, and where they are: on each other, beside the middle of their lane, beside the lane lines of the file.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use super::findings::MIN_VEHICLES;
 use super::lanes::BY_WIDTH;
-use super::road::median;
-use super::understanding::Understanding;
+use super::road::{median, range};
+use super::understanding::{Understanding, lengths_m};
 use crate::trajectory::motion::{JUMP_ACROSS_M, JUMP_ALONG_M, jumps};
-use crate::trajectory::overlap::overlaps;
 use crate::trajectory::{Carriageway, Recording, Track, VehicleClass};
 use lanesweep_support::readable::significant;
 
@@ -24,8 +23,7 @@ const BESIDE_M: f64 = 0.5;
 impl Understanding {
     /// Finds lengths that end at one value.
     pub(super) fn check_sizes(&mut self, recording: &Recording) {
-        let mut lengths: Vec<f64> =
-            recording.tracks.iter().filter(|of| of.class == VehicleClass::Truck).map(|of| of.length_m).collect();
+        let mut lengths = lengths_m(recording, VehicleClass::Truck);
         lengths.sort_by(f64::total_cmp);
         let longest_m = lengths.last().copied().unwrap_or(0.0);
         let others = lengths.iter().filter(|length_m| **length_m < longest_m).count();
@@ -72,19 +70,18 @@ impl Understanding {
 
     /// Finds boxes that overlap or are beside the middle of their lanes, and small jumps.
     pub(super) fn check_boxes(&mut self, recording: &Recording) {
-        let found = overlaps(recording);
-        let involved: HashSet<usize> = found.pairs.iter().flat_map(|(a, b)| [*a, *b]).collect();
+        let (pairs, first, coupled) = overlaps(recording);
+        let involved: HashSet<usize> = pairs.iter().flat_map(|(a, b)| [*a, *b]).collect();
         let is_grave = involved.len() as f64 > MAX_OVERLAPPING * recording.tracks.len() as f64;
         let what = format!(
-            "pair(s) of vehicles overlap, the first are {}: check sizes and `reference` (centre, front, rear, corner)",
-            found.first
+            "pair(s) of vehicles overlap, the first are {first}: check sizes and `reference` (centre, front, rear, corner)"
         );
-        self.find_of(found.pairs.len() as u64, is_grave && involved.len() >= MIN_VEHICLES, &what);
-        if let Some((a, b)) = found.coupled.first().map(|(a, b)| (recording.tracks[*a].id, recording.tracks[*b].id)) {
+        self.find_of(pairs.len() as u64, is_grave && involved.len() >= MIN_VEHICLES, &what);
+        if let Some((a, b)) = coupled.first().map(|(a, b)| (recording.tracks[*a].id, recording.tracks[*b].id)) {
             let what = format!(
                 "pair(s) of vehicles drive less than 1 m apart at one distance for 5 s and longer, the first are vehicles {a} and {b}: join them if they are tractor and trailer, else one leads the other"
             );
-            self.warn_of(found.coupled.len() as u64, &what);
+            self.warn_of(coupled.len() as u64, &what);
         }
         let (mut by_lane, mut by_class) = (Vec::new(), Vec::new());
         for (at, of) in recording.carriageways.iter().enumerate() {
@@ -172,6 +169,61 @@ impl Understanding {
         }
         all
     }
+}
+
+/// Overlap of two boxes that rounding and noise may cause, m.
+const OVERLAP_M: f64 = 0.2;
+/// Nobody drives as near to a vehicle ahead, or keeps the distance as exactly, for so long at such a speed: m, m, s, m/s.
+const COUPLED_M: f64 = 1.0;
+const MAX_PLAY_M: f64 = 0.3;
+const MIN_COUPLED_S: usize = 5;
+const MIN_SPEED_MPS: f64 = 5.0;
+
+/// Pairs of vehicles, as indices into the tracks, the smaller first.
+type Pairs = BTreeSet<(usize, usize)>;
+
+/// Finds, once a second, the pairs that overlap, the first of them in words, and the pairs that are one vehicle, such as tractor and
+/// trailer.
+fn overlaps(recording: &Recording) -> (Pairs, String, Vec<(usize, usize)>) {
+    let mut boxes: Vec<(usize, i64, f64, usize, usize)> = Vec::new();
+    // The same frames for all tracks.
+    let second = recording.frame_rate_hz.round().max(1.0) as usize;
+    for (index, track) in recording.tracks.iter().enumerate() {
+        let first = (-track.first_frame).rem_euclid(second as i64) as usize;
+        let here = |k: usize| (track.carriageway, track.first_frame + k as i64, track.s_m[k], index, k);
+        boxes.extend((first..track.len()).step_by(second).map(here));
+    }
+    boxes.sort_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.total_cmp(&b.2)).then(a.3.cmp(&b.3)));
+    let reach_m = recording.tracks.iter().map(|track| track.length_m).fold(0.0, f64::max) + COUPLED_M;
+    let (mut pairs, mut first) = (Pairs::new(), String::new());
+    let mut near_m: BTreeMap<(usize, usize), Vec<f64>> = BTreeMap::new();
+    for (at, a) in boxes.iter().enumerate() {
+        let near = |b: &&(usize, i64, f64, usize, usize)| (a.0, a.1) == (b.0, b.1) && b.2 - a.2 < reach_m;
+        for b in boxes[at + 1..].iter().take_while(near) {
+            let (behind, ahead) = (&recording.tracks[a.3], &recording.tracks[b.3]);
+            let pair = (a.3.min(b.3), a.3.max(b.3));
+            let along_m = (behind.length_m + ahead.length_m) / 2.0 - (b.2 - a.2);
+            let across_m = (behind.width_m + ahead.width_m) / 2.0 - (behind.d_m[a.4] - ahead.d_m[b.4]).abs();
+            if across_m <= OVERLAP_M {
+                continue;
+            }
+            if along_m > -COUPLED_M && behind.v_s_mps[a.4] > MIN_SPEED_MPS {
+                near_m.entry(pair).or_default().push(along_m);
+            }
+            if along_m > OVERLAP_M {
+                if pairs.is_empty() {
+                    let (behind, ahead, frame) = (behind.id, ahead.id, a.1);
+                    first = format!("vehicles {behind} and {ahead} at frame {frame}, by {along_m:.2} m along the road");
+                }
+                pairs.insert(pair);
+            }
+        }
+    }
+    let is_coupled = |(_, of): &(_, Vec<f64>)| {
+        let (low_m, high_m) = range(of.iter().copied());
+        of.len() >= MIN_COUPLED_S && high_m - low_m < MAX_PLAY_M
+    };
+    (pairs, first, near_m.into_iter().filter(is_coupled).map(|(pair, _)| pair).collect())
 }
 
 /// The mean of vehicles' values and its standard error; `None` for few.

@@ -218,7 +218,8 @@ impl Preset {
         for (role, column) in files.chain([&self.columns]).flatten() {
             if column.factor(*role).is_none_or(|factor| !factor.is_finite() || factor == 0.0) {
                 let known: Vec<&str> = role.units().iter().map(|(name, _)| *name).collect();
-                let problem = format!("the unit `{}` or the factor is not usable", column.unit().unwrap_or_default());
+                let problem =
+                    format!("the unit `{}` or the factor is not usable", column.unit.as_deref().unwrap_or_default());
                 return bad(role.key(), &problem, &format!("units are {}; a factor is not 0", known.join(", ")));
             }
         }

@@ -62,7 +62,7 @@ pub(super) struct RawRecording {
 /// Those of the files, with the place of a bad value.
 pub(super) fn read_table(file: &TrackFile, preset: &Preset) -> Result<Vec<RawRecording>> {
     let rows = Rows::open(&file.path)?;
-    let columns = Columns::of(&preset.columns, rows.header(), &preset.none);
+    let columns = Columns::of(&preset.columns, &rows.header, &preset.none);
     check_columns(&rows, &columns, preset)?;
     // Times tell the rate too.
     let has_frames = columns.has(Role::Frame)
@@ -98,14 +98,14 @@ fn check_columns(rows: &Rows, columns: &Columns, preset: &Preset) -> Result<()> 
         Role::Time => !columns.has(Role::Frame),
         Role::Length | Role::Width if preset.sizes_from.is_some() => true,
         // The names of a shipped preset may be absent in older files, and of several names the user knows that too.
-        _ => preset.is_own && column.names().len() == 1,
+        _ => preset.is_own && column.names.len() == 1,
     };
     let missing = preset.columns.iter().find(|(role, column)| !columns.has(**role) && is_needed(**role, column));
     let Some((role, column)) = missing else { return Ok(()) };
-    let near = column.names().first().and_then(|name| nearest(name, rows.header().iter().map(String::as_str), 0.6));
+    let near = column.names.first().and_then(|name| nearest(name, rows.header.iter().map(String::as_str), 0.6));
     let near = near.filter(|_| preset.sizes_from.is_none());
     let near = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-    let (name, key, names) = (&preset.name, role.key(), column.names().join("` or `"));
+    let (name, key, names) = (&preset.name, role.key(), column.names.join("` or `"));
     let problem = format!("preset {name} takes `{key}` from the column `{names}`, which is not there{near}");
     let help = match &preset.sizes_from {
         Some(code) => format!("make a table with it in Python: {code}"),
@@ -247,7 +247,7 @@ fn read_meta(
         return Err(Error::input(Place::file(&beside), problem, "add it, or use a preset without it"));
     }
     let rows = Rows::open(&beside)?;
-    let columns = Columns::of(&meta.columns, rows.header(), &preset.none);
+    let columns = Columns::of(&meta.columns, &rows.header, &preset.none);
     rows.each(&columns, each)
 }
 

@@ -403,14 +403,11 @@ fn shifted(line: &RoadLine, paths: &[Path]) -> Option<RoadLine> {
             }
         }
     }
-    let mut drift = 0.0;
-    let drifts: Vec<f64> = medians(steps)
-        .into_iter()
-        .map(|step| {
-            drift += step;
-            drift
-        })
-        .collect();
+    let drifts = medians(steps).into_iter().scan(0.0, |drift, step| {
+        *drift += step;
+        Some(*drift)
+    });
+    let drifts: Vec<f64> = drifts.collect();
     let middle = between(&drifts, 0.5 * line.s_m[line.s_m.len() - 1]);
     let moved = line.points.iter().zip(&line.tangents).zip(&line.s_m).map(|((point, tangent), s)| {
         let by = between(&drifts, *s) - middle;

@@ -71,8 +71,9 @@ roles! {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(from = "Written")]
 pub struct ColumnName {
-    names: Vec<String>,
-    unit: Option<String>,
+    /// The names, in the order of preference.
+    pub names: Vec<String>,
+    pub(super) unit: Option<String>,
     factor: f64,
 }
 
@@ -106,19 +107,10 @@ impl From<Written> for ColumnName {
 }
 
 impl ColumnName {
-    /// The names, in the order of preference.
-    pub fn names(&self) -> &[String] {
-        &self.names
-    }
-
-    pub(super) fn unit(&self) -> Option<&str> {
-        self.unit.as_deref()
-    }
-
     /// What the values are multiplied by to be in SI units (angles in rad); `None` for an unknown unit.
     pub fn factor(&self, role: Role) -> Option<f64> {
         let units = role.units();
-        let unit = self.unit().map_or(Some(&units[0]), |unit| units.iter().find(|(name, _)| *name == unit));
+        let unit = self.unit.as_deref().map_or(Some(&units[0]), |unit| units.iter().find(|(name, _)| *name == unit));
         Some(self.factor * unit?.1)
     }
 }

@@ -31,7 +31,7 @@ impl Columns {
     /// Finds the columns in a header; absent ones are left out.
     pub(super) fn of(named: &BTreeMap<Role, ColumnName>, header: &[String], none: &[String]) -> Columns {
         let mut positions: HashMap<String, usize> = HashMap::new();
-        let wanted: HashSet<String> = named.values().flat_map(ColumnName::names).map(|name| letters(name)).collect();
+        let wanted: HashSet<String> = named.values().flat_map(|of| &of.names).map(|name| letters(name)).collect();
         let mut name = String::new();
         for (at, column) in header.iter().enumerate() {
             name.clear();
@@ -42,21 +42,17 @@ impl Columns {
         }
         let mut at = [None; Role::ALL.len()];
         for (role, column) in named {
-            let position = column.names().iter().find_map(|name| positions.get(&letters(name)));
+            let position = column.names.iter().find_map(|name| positions.get(&letters(name)));
             at[*role as usize] = position.copied().zip(column.factor(*role));
         }
-        let has_time_unit = named
-            .get(&Role::Time)
-            .is_some_and(|time| time.unit().is_some_and(|unit| unit != "date") || time.factor(Role::Time) != Some(1.0));
+        let mut has_time_unit = named.get(&Role::Time).is_some_and(|time| {
+            time.unit.as_deref().is_some_and(|unit| unit != "date") || time.factor(Role::Time) != Some(1.0)
+        });
         // INTERACTION's time has its unit in its name.
         let in_ms = header.iter().position(|column| letters(column) == "timestampms");
-        let has_time_unit = match in_ms {
-            Some(position) if at[Role::Time as usize].is_none() && named.contains_key(&Role::Time) => {
-                at[Role::Time as usize] = Some((position, 1e-3));
-                true
-            }
-            _ => has_time_unit,
-        };
+        if at[Role::Time as usize].is_none() && in_ms.is_some() && named.contains_key(&Role::Time) {
+            (at[Role::Time as usize], has_time_unit) = (in_ms.map(|position| (position, 1e-3)), true);
+        }
         let none_numbers = none.iter().filter_map(|text| text.parse().ok()).collect();
         let (names, none) = (header.to_vec(), none.to_vec());
         Columns { at, names, has_time_unit, found_time: Cell::new(None), none, none_numbers }
@@ -129,7 +125,8 @@ fn each_letter(text: &str) -> impl Iterator<Item = char> {
 /// A file of rows.
 pub(super) struct Rows {
     path: PathBuf,
-    header: Vec<String>,
+    /// Column names.
+    pub header: Vec<String>,
     source: RowSource,
 }
 
@@ -151,7 +148,7 @@ impl Rows {
             }
             false => {
                 let table = CsvTable::open(path, "")?;
-                (table.header().to_vec(), RowSource::Text(Box::new(table)))
+                (table.header.clone(), RowSource::Text(Box::new(table)))
             }
         };
         let rows = Rows { path: path.to_path_buf(), header, source };
@@ -162,11 +159,6 @@ impl Rows {
             return Err(Error::input(rows.header_place(), problem, "rename one of them, or remove it"));
         }
         Ok(rows)
-    }
-
-    /// Column names.
-    pub(super) fn header(&self) -> &[String] {
-        &self.header
     }
 
     /// The place of the header.
@@ -182,36 +174,37 @@ impl Rows {
     /// # Errors
     /// Those of the file and of `each`.
     pub(super) fn each(
-        self,
+        mut self,
         columns: &Columns,
         mut each: impl FnMut(&SampleRow) -> Result<()>,
     ) -> Result<FileChecksum> {
+        let mut order = [0; Role::ALL.len()];
+        if let RowSource::Parquet(reader) = &mut self.source {
+            let wanted: Vec<usize> = columns.at.iter().flatten().map(|(at, _)| *at).collect();
+            reader.rows.want(&wanted)?;
+            if reader.rows.has_lists() {
+                let problem = "the cells of a column are lists; a row is one vehicle at one time";
+                let help = "make such a table in Python: `lanesweep.tracks.lists`, or `swiftraj`";
+                return Err(Error::input(Place::file(&self.path), problem, help));
+            }
+            let present = (0..order.len()).filter(|role| columns.at[*role].is_some());
+            present.enumerate().for_each(|(position, role)| order[role] = position);
+        }
+        while self.source.step()? {
+            each(&SampleRow { columns, source: &self.source, order: &order })?;
+        }
         match self.source {
-            RowSource::Text(mut table) => {
-                while table.next_row()? {
-                    each(&SampleRow { columns, source: Line::Text(&table) })?;
-                }
-                table.finish()
-            }
-            RowSource::Parquet(mut reader) => {
-                let wanted: Vec<usize> = columns.at.iter().flatten().map(|(at, _)| *at).collect();
-                reader.rows.want(&wanted)?;
-                if reader.rows.has_lists() {
-                    let problem = "the cells of a column are lists; a row is one vehicle at one time";
-                    let help = "make such a table in Python: `lanesweep.tracks.lists`, or `swiftraj`";
-                    return Err(Error::input(Place::file(&self.path), problem, help));
-                }
-                let mut order = [0; Role::ALL.len()];
-                let present = (0..order.len()).filter(|role| columns.at[*role].is_some());
-                present.enumerate().for_each(|(position, role)| order[role] = position);
-                let mut rows = 0;
-                while reader.rows.step()? {
-                    rows += 1;
-                    let source = Line::Parquet { reader: &reader, row: rows, order: &order };
-                    each(&SampleRow { columns, source })?;
-                }
-                FileChecksum::of(&self.path)
-            }
+            RowSource::Text(table) => table.finish(),
+            RowSource::Parquet(_) => FileChecksum::of(&self.path),
+        }
+    }
+}
+
+impl RowSource {
+    fn step(&mut self) -> Result<bool> {
+        match self {
+            RowSource::Text(table) => table.next_row(),
+            RowSource::Parquet(reader) => reader.rows.step(),
         }
     }
 }
@@ -219,26 +212,18 @@ impl Rows {
 /// One sample of one vehicle.
 pub(super) struct SampleRow<'a> {
     pub columns: &'a Columns,
-    source: Line<'a>,
-}
-
-enum Line<'a> {
-    Text(&'a CsvTable),
-    Parquet {
-        reader: &'a TableReader,
-        row: u64,
-        /// Position of each role's column in the selection.
-        order: &'a [usize],
-    },
+    source: &'a RowSource,
+    /// Position of each role's column in the selection of a Parquet file.
+    order: &'a [usize],
 }
 
 impl SampleRow<'_> {
     /// The value of a column; one of several that `;` joins counts, the first.
     fn cell(&self, role: Role) -> TableCell<'_> {
         let Some((at, _)) = self.columns.at[role as usize] else { return TableCell::Null };
-        match &self.source {
-            Line::Text(table) => TableCell::Text(String::from_utf8_lossy(first_of(table.bytes(at)))),
-            Line::Parquet { reader, order, .. } => match reader.rows.cell(order[role as usize]) {
+        match self.source {
+            RowSource::Text(table) => TableCell::Text(String::from_utf8_lossy(first_of(table.bytes(at)))),
+            RowSource::Parquet(reader) => match reader.rows.cell(self.order[role as usize]) {
                 TableCell::Text(Cow::Borrowed(text)) => TableCell::Text(Cow::Borrowed(text.trim())),
                 cell => cell,
             },
@@ -249,8 +234,8 @@ impl SampleRow<'_> {
     pub(super) fn number(&self, role: Role) -> Result<Option<f64>> {
         let si = |value: f64, text: &dyn Fn() -> String| self.columns.si(value, role, text, || self.place(role));
         // Most values, without a text.
-        if let (Line::Text(table), Some((at, _))) = (&self.source, self.columns.at[role as usize])
-            && !table.has_decimal_commas()
+        if let (RowSource::Text(table), Some((at, _))) = (self.source, self.columns.at[role as usize])
+            && !table.has_decimal_commas
             && let Some(value) = number::short_decimal(table.bytes(at))
         {
             return si(value, &|| String::from_utf8_lossy(table.bytes(at)).into_owned());
@@ -267,8 +252,8 @@ impl SampleRow<'_> {
     /// A number in SI units of a text.
     fn number_of(&self, text: &str, role: Role) -> Result<Option<f64>> {
         let (columns, mut text) = (self.columns, Cow::Borrowed(text));
-        if let Line::Text(table) = self.source
-            && table.has_decimal_commas()
+        if let RowSource::Text(table) = self.source
+            && table.has_decimal_commas
             && !text.contains(':')
         {
             // A point separates thousands, or another program wrote this number.
@@ -316,9 +301,9 @@ impl SampleRow<'_> {
 
     /// The place of a value.
     pub(super) fn place(&self, role: Role) -> Place {
-        let place = match &self.source {
-            Line::Text(table) => table.place(),
-            Line::Parquet { reader, row, .. } => reader.place(*row, None),
+        let place = match self.source {
+            RowSource::Text(table) => table.place(),
+            RowSource::Parquet(reader) => reader.place(reader.rows.number(), None),
         };
         place.column(self.columns.name(role))
     }

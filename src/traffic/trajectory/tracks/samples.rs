@@ -152,12 +152,10 @@ pub(super) fn number(value: f64) -> Option<u32> {
 pub(super) fn between(before: &Sample, after: &Sample, part: f64) -> Sample {
     std::array::from_fn(|column| {
         let (a, b) = (before[column], after[column]);
-        if part == 0.0 || (column >= LANE && part < 0.5) {
-            a
-        } else if part == 1.0 || column >= LANE {
-            b
-        } else {
-            a + part * (b - a)
+        match if column >= LANE { part.round() } else { part } {
+            0.0 => a,
+            1.0 => b,
+            part => a + part * (b - a),
         }
     })
 }

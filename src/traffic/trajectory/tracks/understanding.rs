@@ -2,7 +2,6 @@
 
 use serde::Serialize;
 
-use super::LoadedTracks;
 use super::offsets::way;
 use super::preset::Preset;
 use super::road::median;
@@ -121,7 +120,7 @@ impl Understanding {
     ///
     /// # Errors
     /// [`Error::Input`] if no vehicle is left.
-    pub(in crate::trajectory) fn of_highd(mut loaded: Loaded, place: &Place) -> Result<LoadedTracks> {
+    pub(in crate::trajectory) fn of_highd(mut loaded: Loaded, place: &Place) -> Result<Loaded> {
         let recording = &loaded.recording;
         let mut about = Understanding::new(&recording.id);
         std::mem::take(&mut loaded.notes).into_iter().for_each(|note| about.warn(note));
@@ -146,7 +145,7 @@ impl Understanding {
         let [backward_m, forward_m] = centres_m.each_mut().map(|of| median(of));
         about.seen.oncoming_left_m = Some(-backward_m - forward_m).filter(|left_m| !left_m.is_nan());
         about.judge(&mut loaded.recording, &Preset::default(), place)?;
-        Ok(LoadedTracks { loaded, understanding: about })
+        Ok(Loaded { understanding: about, ..loaded })
     }
 
     pub(super) fn fact(&mut self, name: &'static str, text: impl Into<String>) {
@@ -166,18 +165,17 @@ impl Understanding {
             if driven_m.abs().max(moved_m.abs()) > 20.0 {
                 self.seen.ratios.push(moved_m / driven_m.abs().max(0.1));
             }
-            let reach = (rate_hz / 2.0).round().max(1.0) as usize;
-            let change = |of: &[f64], k: usize| (of[k + reach] - of[k - reach]) * rate_hz / (2 * reach) as f64;
-            for k in (reach..s_m.len().saturating_sub(reach)).step_by(reach) {
-                self.seen.delay[0].add(change(s_m, k) - given[k], change(given, k));
-            }
         }
-        if let Some(given) = given_d {
-            let reach = (rate_hz / 5.0).round().max(1.0) as usize;
+        for (axis, at_m, given, per_s) in [(0, s_m, given_s, 2.0), (1, d_m, given_d, 5.0)] {
+            let Some(given) = given else { continue };
+            let reach = (rate_hz / per_s).round().max(1.0) as usize;
             let change = |of: &[f64], k: usize| (of[k + reach] - of[k - reach]) * rate_hz / (2 * reach) as f64;
-            for k in (reach..d_m.len().saturating_sub(reach)).step_by(reach) {
-                self.seen.lateral.add(given[k], change(d_m, k));
-                self.seen.delay[1].add(change(d_m, k) - given[k], change(given, k));
+            for k in (reach..at_m.len().saturating_sub(reach)).step_by(reach) {
+                let moved_mps = change(at_m, k);
+                self.seen.delay[axis].add(moved_mps - given[k], change(given, k));
+                if axis == 1 {
+                    self.seen.lateral.add(given[k], moved_mps);
+                }
             }
         }
     }
@@ -207,16 +205,14 @@ impl Understanding {
         self.check_parts(recording);
         self.clear_noise(recording);
         for (index, of) in recording.carriageways.iter().enumerate() {
-            let widths = of.lane_lines_m.windows(2).map(|two| significant(two[0] - two[1], 3));
-            let widths = widths.collect::<Vec<_>>().join(" ");
+            let widths = of.widths_m().map(|width_m| significant(width_m, 3)).collect::<Vec<_>>().join(" ");
             let source = self.seen.lane_sources.get(index).copied().unwrap_or("the lane lines in the file");
             let (lanes, tracks) =
                 (of.lane_count(), recording.tracks.iter().filter(|of| of.carriageway == index).count());
             self.fact("lanes", format!("{}: {lanes} lanes of {widths} m from {source}; {tracks} tracks", way(of)));
         }
         let of_class = |class: VehicleClass, name: &str| {
-            let of = recording.tracks.iter().filter(|track| track.class == class);
-            let mut lengths_m: Vec<f64> = of.map(|track| track.length_m).collect();
+            let mut lengths_m = lengths_m(recording, class);
             format!("{} {name} of {} m", count(lengths_m.len() as u64), significant(median(&mut lengths_m), 3))
         };
         let (cars, lorries) = (of_class(VehicleClass::Car, "cars"), of_class(VehicleClass::Truck, "lorries"));
@@ -264,6 +260,11 @@ impl Understanding {
     pub(super) fn warn_of(&mut self, number: u64, what: &str) {
         self.find_of(number, false, what);
     }
+}
+
+/// Lengths of the vehicles of a class, m.
+pub(super) fn lengths_m(recording: &Recording, class: VehicleClass) -> Vec<f64> {
+    recording.tracks.iter().filter(|track| track.class == class).map(|track| track.length_m).collect()
 }
 
 /// Median of a value over the tracks.
