@@ -172,8 +172,8 @@ fn verdicts(study: &Study) -> lanesweep::Result<Vec<Chunk>> {
 
 /// Adds what is recorded after T while every vehicle of the scenario is in view.
 fn prolong(scenario: &mut Scenario, recording: &Recording) -> Option<()> {
-    let target = recording.track(scenario.target_id)?;
-    let lead = scenario.lead_id.and_then(|id| recording.track(id));
+    let of = |id: u32| recording.tracks.iter().find(|track| track.id == id);
+    let (target, lead) = (of(scenario.target_id)?, scenario.lead_id.and_then(of));
     let last = target.last_frame().min(lead.map_or(i64::MAX, Track::last_frame));
     let (frame1, sign) = (scenario.frame1, scenario.side.sign());
     let add = |other: &mut Other, track: &Track| {

@@ -1,6 +1,5 @@
 //! The source of scenarios, and their provenance.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -105,9 +104,13 @@ impl Source {
         let scenarios_sha256 = match self {
             Source::Scenarios { path, .. } => input_file::sha256(path)?,
             _ => {
-                let mut hash = Hashing(Sha256::new());
-                write_scenarios_to(&mut hash, &collection.scenarios)?;
-                hex(&hash.0.finalize())
+                let mut hash = Sha256::new();
+                for scenario in &collection.scenarios {
+                    let mut line = Vec::new();
+                    write_scenarios_to(&mut line, [scenario])?;
+                    hash.update(&line);
+                }
+                hex(&hash.finalize())
             }
         };
         let mut provenance = DataProvenance {
@@ -168,19 +171,5 @@ impl Collection {
         let kilometres = self.recordings.iter().map(|r| r.driven_m).sum::<f64>() / 1000.0;
         let positive = |v: f64| (v > 0.0).then_some(v);
         Driven { hours: positive(hours), kilometres: positive(kilometres) }.known()
-    }
-}
-
-/// A writer that computes only a checksum.
-struct Hashing(Sha256);
-
-impl Write for Hashing {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        self.0.update(bytes);
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        Ok(())
     }
 }

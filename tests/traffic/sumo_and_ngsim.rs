@@ -213,7 +213,7 @@ fn a_number_that_comes_back_after_a_pause_is_another_vehicle() {
     let [lorry] = again[..] else { panic!("{} tracks", again.len()) };
     assert_eq!((lorry.length_m, lorry.class), (16.5, VehicleClass::Truck));
     assert_eq!(loaded.vehicle_names.get(&lorry.id).map(String::as_str), Some("2"));
-    let first = loaded.recording.track(2).unwrap();
+    let first = loaded.recording.tracks.iter().find(|track| track.id == 2).unwrap();
     assert_eq!((first.length_m, first.class), (4.5, VehicleClass::Car));
     assert!(loaded.notes.iter().any(|note| note.contains("comes back")), "{:?}", loaded.notes);
 }

@@ -1,6 +1,6 @@
 //! Rows of a CSV file, one at a time.
 
-use std::io::{BufReader, Cursor, Read};
+use std::io::{Cursor, Read, Take};
 use std::path::{Path, PathBuf};
 
 use super::writer::text_of_cell;
@@ -14,29 +14,13 @@ const START_BYTES: u64 = 1 << 16;
 
 pub(super) struct CsvRows {
     path: PathBuf,
-    reader: csv::Reader<BudgetedFile>,
+    /// It ends within a row that is too long.
+    reader: csv::Reader<Take<Box<dyn Read + Send>>>,
     record: csv::StringRecord,
     wanted: Vec<usize>,
     decimal_commas: bool,
     /// The reader counts a Windows line end to the next row.
     lines_off: u64,
-}
-
-/// A file that returns an error after a budget of bytes.
-struct BudgetedFile {
-    file: BufReader<Box<dyn Read + Send>>,
-    left: u64,
-}
-
-impl Read for BudgetedFile {
-    fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
-        if self.left == 0 {
-            return Err(std::io::Error::from(std::io::ErrorKind::OutOfMemory));
-        }
-        let count = self.file.read(bytes)?;
-        self.left = self.left.saturating_sub(count as u64);
-        Ok(count)
-    }
 }
 
 /// The delimiter that the first line has most of; a comma if it has none.
@@ -78,11 +62,13 @@ impl CsvRows {
         let decimal_commas = delimiter != b',' && has_decimal_commas(&start, delimiter);
         let has_windows_ends =
             start.split_inclusive(|byte| *byte == b'\n').next().is_some_and(|line| line.ends_with(b"\r\n"));
-        let file = BudgetedFile { file: BufReader::new(Box::new(Cursor::new(start).chain(text))), left: MAX_ROW_BYTES };
+        let whole: Box<dyn Read + Send> = Box::new(Cursor::new(start).chain(text));
+        let file = whole.take(MAX_ROW_BYTES);
         let reader = csv::ReaderBuilder::new().trim(csv::Trim::All).delimiter(delimiter).from_reader(file);
         let (path, record) = (path.to_path_buf(), csv::StringRecord::new());
         let mut rows = CsvRows { path, reader, record, wanted: Vec::new(), decimal_commas, lines_off: 0 };
-        let header = rows.reader.headers().cloned().map_err(|e| rows.error(e))?;
+        let header = rows.reader.headers().cloned();
+        let header = rows.within(header)?;
         rows.lines_off = u64::from(has_windows_ends);
         let columns: Vec<String> =
             header.iter().map(|name| name.trim_start_matches('\u{feff}').trim().to_owned()).collect();
@@ -99,8 +85,9 @@ impl TableRows for CsvRows {
 
     fn step(&mut self) -> Result<bool> {
         loop {
-            self.reader.get_mut().left = MAX_ROW_BYTES;
-            let is_row = self.reader.read_record(&mut self.record).map_err(|e| self.error(e))?;
+            self.reader.get_mut().set_limit(MAX_ROW_BYTES);
+            let read = self.reader.read_record(&mut self.record);
+            let is_row = self.within(read)?;
             // Spreadsheets write rows of empty fields below a table.
             if !is_row || self.record.iter().any(|field| !field.is_empty()) {
                 return Ok(is_row);
@@ -126,15 +113,19 @@ impl TableRows for CsvRows {
 }
 
 impl CsvRows {
+    /// What was read of a row that is not too long.
+    fn within<T>(&self, read: csv::Result<T>) -> Result<T> {
+        if self.reader.get_ref().limit() == 0 {
+            let problem = format!("a row is longer than {} MiB", MAX_ROW_BYTES >> 20);
+            return Err(Error::input(Place::file(&self.path), problem, "look for a quote that is not closed"));
+        }
+        read.map_err(|e| self.error(e))
+    }
+
     fn error(&self, error: csv::Error) -> Error {
         let (file, line) = (Place::file(&self.path), error.position().map(|position| position.line() + self.lines_off));
         let place = line.map_or(file.clone(), |line| file.clone().row(line));
         match error.into_kind() {
-            csv::ErrorKind::Io(source) if source.kind() == std::io::ErrorKind::OutOfMemory => Error::input(
-                place,
-                format!("a row is longer than {} MiB", MAX_ROW_BYTES >> 20),
-                "look for a quote that is not closed",
-            ),
             csv::ErrorKind::Io(source) => Error::io(&self.path, "read", source),
             csv::ErrorKind::Utf8 { .. } => Error::input(place, "not UTF-8 text", "save the file as UTF-8"),
             csv::ErrorKind::UnequalLengths { expected_len, len, .. } => Error::input(

@@ -166,13 +166,6 @@ impl Track {
     }
 }
 
-impl Recording {
-    /// The vehicle with this number.
-    pub fn track(&self, id: u32) -> Option<&Track> {
-        self.tracks.binary_search_by_key(&id, |t| t.id).ok().map(|i| &self.tracks[i])
-    }
-}
-
 /// Tolerance of geometric limits, m: data have two decimals, and without a tolerance a recording rotated by 180°
 /// would give other scenarios.
 pub(crate) const LIMIT_TOLERANCE_M: f64 = 1e-6;
