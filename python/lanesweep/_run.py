@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import difflib
+import functools
 import importlib
 import json
 import logging
@@ -10,7 +12,7 @@ import numbers
 import os
 import sys
 import warnings
-from collections.abc import Callable, Collection, Iterator, KeysView, Mapping, Sequence, Set, ValuesView
+from collections.abc import Callable, Collection, Iterable, Iterator, KeysView, Mapping, Sequence, Set, ValuesView
 from pathlib import Path
 from typing import Any
 
@@ -119,7 +121,18 @@ def _scalar(value: Any, name: str) -> Any:
         return float(value)
     if isinstance(value, numbers.Number):
         return str(value)
+    if is_table(value):
+        raise _core.UsageError(f"`{name}` is a table in memory\n  help: write it into a file first (Parquet, CSV), and give its path")
     raise TypeError(f"`{name}` has the value {value!r:.80}; give a number, a text, a path, or a list of these that holds no lists")
+
+
+def one_of(value: str, names: Iterable[str], what: str) -> str:
+    """Return a name that is one of the known ones; the error has the nearest of these."""
+    known = list(names)
+    if value not in known:
+        help = "".join(f"\n  help: did you mean `{near}`?" for near in difflib.get_close_matches(str(value), known, 1))
+        raise _core.UsageError(f"there is no {what} `{value}`; there are {', '.join(known)}{help}")
+    return value
 
 
 def path_of(value: Any, name: str) -> str:
@@ -212,15 +225,26 @@ def run(function: str, arguments: Mapping[str, Any]) -> Result:
     if given.get("models") is not None:
         given["models"] = names_of(given["models"])
     keep = None
+    # How errors and messages call the files of values in memory.
+    called: dict[str, str] = {}
+
+    def in_words(text: str) -> str:
+        return functools.reduce(lambda text, file: text.replace(file, called[file]), called, text)
+
     for name in ("scenarios", "file", "table"):
-        value = given.get(name)
+        value: Any = given.get(name)
+        value = value._asdict() if hasattr(value, "_asdict") else value  # a row of `itertuples`
         is_row = isinstance(value, Mapping) or getattr(value, "ndim", 2) == 1
         if is_row and name != "scenarios":
             keep = keep or temporary()
             given[name], given["row"] = row_file(value, Path(keep.name) / f"{name}.csv"), given.get("row") or 1
+            called |= {f"{given[name]}, line 2": f"`{name}`", str(given[name]): f"`{name}`"}
         elif is_table(value):
             keep = keep or temporary()
             given[name] = table_file(value, Path(keep.name) / name)
+            called[str(given[name])] = f"`{name}`"
+        elif isinstance(value, (tuple, list)):
+            raise _core.UsageError(f"`{name}` is {value!r:.80}\n  help: give a file, a table, or a row with its names: a mapping")
     external = given.get("external")
     tables = external if isinstance(external, Mapping) else {"external": external} if is_table(external) else {}
     if tables:
@@ -241,6 +265,7 @@ def run(function: str, arguments: Mapping[str, Any]) -> Result:
     messages: list[str] = []
 
     def on_line(level: str, line: str) -> None:
+        line = in_words(line)
         messages.append(line)
         on_message(level, line)
 
@@ -250,8 +275,11 @@ def run(function: str, arguments: Mapping[str, Any]) -> Result:
     call = os.fsencode(f"lanesweep.{function}({shown})").decode(errors="replace")
     try:
         code, text, document, frames = _core.run(function, call, {name: _words(value) for name, value in values.items()}, move, on_line)
+    except _core.LanesweepError as error:
+        error.args, error.problem = (in_words(str(error)),), in_words(error.problem)
+        raise
     finally:
         close()
     if code == _NOTHING:
         raise _core.InputError("\n".join(messages) or "there is nothing that can be read")
-    return Result(function, code, text, document, frames, messages, None if path is None else Path(path_of(path, "out")), keep)
+    return Result(function, code, in_words(text), document, frames, messages, None if path is None else Path(path_of(path, "out")), keep)

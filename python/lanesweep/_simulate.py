@@ -19,7 +19,7 @@ from ._driver import Driver, name_of, names_of, register
 from ._run import on_message, path_of, plain
 
 if TYPE_CHECKING:
-    from .options import Headways, Models, Path
+    from .options import Criterion, Headways, Models, Path
 
 
 def _column(name: str, values: Any) -> Any:
@@ -103,7 +103,7 @@ def simulate(
     Frame
         A row per case, headway and model, the last varying fastest: verdicts, minima and maxima, times in s, speeds in m/s. Lanes
         are in binary32, as in a study. Where `robust` is false, binary64 (`check`, `trace`, ``reference=True``) gives another
-        verdict: the case is within rounding of a limit.
+        verdict: the case is within rounding of a limit. Of a driver of your own it is null.
 
     Raises
     ------
@@ -116,6 +116,8 @@ def simulate(
     >>> lanesweep.simulate(cases, category="cut-in", models="FSM")["collision"]
     array([ True, False])
     """
+    if isinstance(cases, (str, os.PathLike)) or (isinstance(cases, Mapping) and not cases):
+        raise _core.InputError(f"`cases` is {cases!r:.80}\n  help: give a table of cases; `check` and `trace` read files")
     library = type(cases).__module__.split(".")[0]
     if isinstance(cases, Mapping):
         cases = _frame_of(cases)
@@ -199,7 +201,7 @@ class LimitState(_core.LimitState):
         density: Path,
         *,
         model: str | Driver = "FSM",
-        criterion: str = "collision",
+        criterion: Criterion = "collision",
         thw: float | str | None = None,
         profile: Path = "paper",
         backend: str = "cpu",

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from .. import _verbs
+from .._core import InputError
+from .._run import one_of
 from ..options import Criterion
 from ._shared import extra, quiet, table
 
@@ -36,13 +38,13 @@ class Description(NamedTuple):
 
 def fit_description(scenarios: Any, size: int, emphasis: npt.ArrayLike | None = None) -> Description:
     """Decompose scenarios of one category (singular values) with weights times exp(emphasis): 4 knots per series, one per number."""
-    rows = table(scenarios)
+    rows = table(scenarios, "category", "target_v", "fps")
     return _fit(_vectors(rows), _category(rows), size, emphasis)
 
 
 def replayed(description: Description, scenarios: Any) -> pl.DataFrame:
     """Return scenarios as the description keeps them: an S' for `study(external=…)`."""
-    rows = table(scenarios)
+    rows = table(scenarios, "category", "target_v", "fps")
     return _scenarios(rows, _decoded(description, _vectors(rows)))
 
 
@@ -56,7 +58,8 @@ def found_emphasis(
     """
     with extra():
         import cma
-    rows = table(scenarios)
+    one_of(criterion, get_args(Criterion), "criterion")
+    rows = table(scenarios, "category", "target_v", "fps")
     z, category = _vectors(rows), _category(rows)
     series, numbers = _LAYOUT[category]
     data: Any = rows
@@ -103,8 +106,10 @@ def _decoded(description: Description, z: Array) -> Array:
 
 
 def _category(rows: pl.DataFrame) -> str:
-    (found,) = rows["category"].unique()
-    return str(found)
+    found = rows["category"].unique().to_list()
+    if len(found) != 1:
+        raise InputError(f"there are scenarios of {', '.join(map(str, found))}\n  help: give those of one category")
+    return one_of(str(found[0]), _LAYOUT, "category")
 
 
 def _scenarios(rows: pl.DataFrame, z: Array) -> pl.DataFrame:
@@ -136,6 +141,8 @@ def _scores(rows: pl.DataFrame, described: Mapping[str, pl.DataFrame], criterion
     with quiet():
         study = _verbs.study(scenarios=data, external=described, accept_implausible=True, config={"study": {"folds": 1}})
     judged = table(study.table("results")).filter((pl.col("criterion") == criterion) & (pl.col("failing_scenarios") >= 10))
+    if judged.is_empty():
+        raise InputError(f"no driver fails in ten of these scenarios ({criterion})\n  help: give more scenarios, or another criterion")
     means = judged.group_by("variant").agg(pl.col("f1").fill_null(0.0).mean())
     by_name = dict(means.iter_rows())
     return [float(by_name[name]) for name in described]

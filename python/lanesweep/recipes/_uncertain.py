@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from .._core import InputError
 from ..options import Path
-from ._shared import answers, extra
+from ._shared import answers, case_of, extra, within
 
 if TYPE_CHECKING:
     import polars as pl
@@ -25,7 +26,8 @@ class Uncertainty(NamedTuple):
     drivers : DataFrame
         Per driver, the draws in which it avoids the collision, of those in which an ego that never reacts collides.
     indices : DataFrame
-        Per input, the first-order index: the fraction of the variance of the answer that its error alone explains.
+        Per input, the first-order index: the fraction of the variance of the answer that its error alone explains, with the
+        half-width of its interval (95 %).
     draws : DataFrame
         Every draw with its answer; null where the numbers are no case.
     """
@@ -52,12 +54,14 @@ def uncertain(
     with extra():
         import polars as pl
         from scipy import stats
+    within(1, float("inf"), draws=draws)
+    case = case_of(case, errors)
     generator = np.random.default_rng(seed)
     known = {name: stats.norm(scale=error) if np.isscalar(error) else error for name, error in errors.items()}
     if absent := [name for name in known if name not in case]:
-        raise ValueError(f"{', '.join(absent)}: the case has no such column; it has {', '.join(case)}")
+        raise InputError(f"{', '.join(absent)}: the case has no such column; it has {', '.join(case)}")
     if texts := [name for name in known if isinstance(case[name], str)]:
-        raise ValueError(f"{', '.join(texts)}: what has an error is a number; write the unit into the name: ego_speed_kmh")
+        raise InputError(f"{', '.join(texts)}: what has an error is a number; write the unit into the name: ego_speed_kmh")
     drawn = {name: case[name] + error.rvs(draws, random_state=generator) for name, error in known.items()}
     cases = pl.DataFrame({**case, **drawn})
     found = answers(cases, profile)
@@ -66,7 +70,7 @@ def uncertain(
     counts = judged["verdict"].value_counts(sort=True)
     drivers: list[str] = [name for name in ("Reg157", "CCHDM", "RSS", "FSM") if name in found.columns]
     avoiding = [conflicts.filter(pl.col(name) != "COLLIDES").height for name in drivers]
-    own = answers(pl.DataFrame(dict(case)), profile)["verdict"][0]
+    own = answers(pl.DataFrame(case), profile)["verdict"][0]
     inputs = cases.select(list(drawn)).with_columns(is_own=found["verdict"] == own).drop_nulls()
     return Uncertainty(
         _shares("answer", counts["verdict"].to_list(), counts["count"].to_list(), judged.height),

@@ -5,11 +5,12 @@ from __future__ import annotations
 import gzip
 import json
 import logging
+import math
 import os
 import re
 import xml.etree.ElementTree as ET
 import zlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import IO, Any, cast
 
@@ -35,12 +36,15 @@ def bad(path: File, place: str, problem: str, help: str) -> InputError:
     return InputError(f"{os.fspath(path)}: {place}: {problem}\n  help: {help}")
 
 
-def number(path: File, place: str, text: str | float | None) -> float:
-    """Return the number that a text is."""
+def number(path: File, place: str, text: str | float | None, *, above: float = -math.inf) -> float:
+    """Return the finite number that a text is."""
     try:
-        return float(text if text is not None else "")
+        value = float(text if text is not None else "")
     except ValueError:
-        raise bad(path, place, f"{text!r} is not a number", "correct the value") from None
+        value = math.nan
+    if not above < value < math.inf:
+        raise bad(path, place, f"{text!r} is not a number" + f" above {above}" * math.isfinite(above), "correct the value")
+    return value
 
 
 def warn_left_out(path: File, names: Iterable[Any], what: str) -> None:
@@ -108,11 +112,17 @@ def json_vehicles(path: File, key: str = "") -> list[dict[str, Any]]:
     return found
 
 
+def _check_columns(path: File, columns: Mapping[str, str], there: Collection[str]) -> None:
+    for theirs in columns:
+        if theirs not in there:
+            raise bad(path, f"column `{theirs}`", f"not there; the file has {', '.join(there)}", "check that it has this format")
+
+
 def unpacked(path: File, vehicles: pl.DataFrame, columns: Mapping[str, str]) -> pl.DataFrame:
     """A row per item of the lists of the vehicles; `columns` has our names by theirs."""
-    for theirs in columns:
-        if theirs not in vehicles.columns:
-            raise bad(path, f"column `{theirs}`", f"not there; the file has {', '.join(vehicles.columns)}", "check that it has this format")
+    _check_columns(path, columns, vehicles.columns)
+    arrays = [name for name, dtype in vehicles.schema.items() if isinstance(dtype, pl.Array)]
+    vehicles = vehicles.with_columns(pl.col(name).arr.to_list() for name in arrays)
     frame = vehicles.select(pl.col(theirs).alias(ours) for theirs, ours in columns.items())
     packed = [name for name, dtype in frame.schema.items() if isinstance(dtype, pl.List)]
     if not packed:
@@ -128,6 +138,8 @@ def unpacked(path: File, vehicles: pl.DataFrame, columns: Mapping[str, str]) -> 
 
 def json_lists(path: File, vehicles: list[dict[str, Any]], columns: Mapping[str, str]) -> pl.DataFrame:
     """The same of vehicles from JSON."""
+    if vehicles:
+        _check_columns(path, columns, dict.fromkeys(key for vehicle in vehicles for key in vehicle))
     frame = {}
     for theirs in columns:
         cells = [vehicle.get(theirs) for vehicle in vehicles]
@@ -140,15 +152,17 @@ def json_lists(path: File, vehicles: list[dict[str, Any]], columns: Mapping[str,
 
 
 def canonical(path: File, frame: pl.DataFrame) -> pl.DataFrame:
-    """The columns in their order and with their types; a text that is no number is an error."""
+    """The columns in their order and with their types; what is no finite number, or no size, is an error."""
     names = [name for name in COLUMNS if name in frame.columns]
     types = {name: pl.String if name in _TEXTS else pl.Int64 if name == "frame" else pl.Float64 for name in names}
     table = frame.select(pl.col(name).cast(dtype, strict=False) for name, dtype in types.items())
     for name in names:
-        wrong = frame.filter(table[name].is_null() & frame[name].is_not_null())
+        is_size, found = name in ("length_m", "width_m"), table[name]
+        is_good = found.is_finite() & (found > (0.0 if is_size else -math.inf)) if types[name] == pl.Float64 else found.is_not_null()
+        wrong = frame.filter(~is_good.fill_null(False) & frame[name].is_not_null())
         if len(wrong):
             place = ", ".join(f"{of} {wrong[of][0]}" for of in ("vehicle_id", "frame", "time_s") if of in wrong.columns)
-            raise bad(path, place, f"`{name}` is {wrong[name][0]!r}; expected a number", "correct the value")
+            raise bad(path, place, f"`{name}` is {wrong[name][0]!r}; expected a {'size' if is_size else 'number'}", "correct the value")
     if table.is_empty():
         raise bad(path, "the file", "there is no vehicle", "check that it has this format")
     return table
