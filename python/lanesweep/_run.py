@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import csv
-import difflib
-import functools
 import importlib
 import json
 import logging
 import numbers
 import os
+import re
 import sys
+import tempfile
 import warnings
-from collections.abc import Callable, Collection, Iterable, Iterator, KeysView, Mapping, Sequence, Set, ValuesView
+from collections.abc import Callable, Collection, Iterator, KeysView, Mapping, Sequence, Set, ValuesView
 from pathlib import Path
 from typing import Any
 
@@ -126,15 +126,6 @@ def _scalar(value: Any, name: str) -> Any:
     raise TypeError(f"`{name}` has the value {value!r:.80}; give a number, a text, a path, or a list of these that holds no lists")
 
 
-def one_of(value: str, names: Iterable[str], what: str) -> str:
-    """Return a name that is one of the known ones; the error has the nearest of these."""
-    known = list(names)
-    if value not in known:
-        help = "".join(f"\n  help: did you mean `{near}`?" for near in difflib.get_close_matches(str(value), known, 1))
-        raise _core.UsageError(f"there is no {what} `{value}`; there are {', '.join(known)}{help}")
-    return value
-
-
 def path_of(value: Any, name: str) -> str:
     """Write the path of an argument."""
     try:
@@ -208,6 +199,12 @@ def _shown(value: Any) -> str:
     return json.dumps(str(value), ensure_ascii=False) if isinstance(value, (str, Path)) else repr(value)
 
 
+def _in_words(text: str) -> str:
+    """Name the argument in place of the temporary file that holds its row or table."""
+    folder = re.escape(os.path.join(tempfile.gettempdir(), "lanesweep-"))
+    return re.sub(rf"{folder}\w+[/\\](scenarios|file|table)\.(csv, line 2\b|csv|parquet)", r"`\1`", text)
+
+
 #: Names of results in a temporary folder, without the argument `out`.
 _OUT = {"study": "study", "tracks": "tracks", "mine": "scenarios.jsonl", "fit": "densities", "sample": "sample", "map": "map"}
 
@@ -225,12 +222,6 @@ def run(function: str, arguments: Mapping[str, Any]) -> Result:
     if given.get("models") is not None:
         given["models"] = names_of(given["models"])
     keep = None
-    # How errors and messages call the files of values in memory.
-    called: dict[str, str] = {}
-
-    def in_words(text: str) -> str:
-        return functools.reduce(lambda text, file: text.replace(file, called[file]), called, text)
-
     for name in ("scenarios", "file", "table"):
         value: Any = given.get(name)
         value = value._asdict() if hasattr(value, "_asdict") else value  # a row of `itertuples`
@@ -238,11 +229,9 @@ def run(function: str, arguments: Mapping[str, Any]) -> Result:
         if is_row and name != "scenarios":
             keep = keep or temporary()
             given[name], given["row"] = row_file(value, Path(keep.name) / f"{name}.csv"), given.get("row") or 1
-            called |= {f"{given[name]}, line 2": f"`{name}`", str(given[name]): f"`{name}`"}
         elif is_table(value):
             keep = keep or temporary()
             given[name] = table_file(value, Path(keep.name) / name)
-            called[str(given[name])] = f"`{name}`"
         elif isinstance(value, (tuple, list)):
             raise _core.UsageError(f"`{name}` is {value!r:.80}\n  help: give a file, a table, or a row with its names: a mapping")
     external = given.get("external")
@@ -265,7 +254,7 @@ def run(function: str, arguments: Mapping[str, Any]) -> Result:
     messages: list[str] = []
 
     def on_line(level: str, line: str) -> None:
-        line = in_words(line)
+        line = _in_words(line)
         messages.append(line)
         on_message(level, line)
 
@@ -276,10 +265,10 @@ def run(function: str, arguments: Mapping[str, Any]) -> Result:
     try:
         code, text, document, frames = _core.run(function, call, {name: _words(value) for name, value in values.items()}, move, on_line)
     except _core.LanesweepError as error:
-        error.args, error.problem = (in_words(str(error)),), in_words(error.problem)
+        error.args, error.problem = (_in_words(str(error)),), _in_words(error.problem)
         raise
     finally:
         close()
     if code == _NOTHING:
         raise _core.InputError("\n".join(messages) or "there is nothing that can be read")
-    return Result(function, code, in_words(text), document, frames, messages, None if path is None else Path(path_of(path, "out")), keep)
+    return Result(function, code, _in_words(text), document, frames, messages, None if path is None else Path(path_of(path, "out")), keep)

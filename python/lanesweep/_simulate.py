@@ -126,7 +126,8 @@ def simulate(
         index = cases.index
         counts = type(index).__name__ == "RangeIndex" and index.name is None and index.start == 0 and index.step == 1
         cases = cases.reset_index(drop=counts)
-        if not _has_arrow(cases):
+        if not hasattr(cases, "__arrow_c_stream__") or importlib.util.find_spec("pyarrow") is None:
+            # pandas hands out Arrow data from 2.2 on, if pyarrow is installed.
             cases = _frame_of({name: cases[name].to_numpy() for name in cases.columns})
     elif library == "polars" and hasattr(cases, "schema"):
         # Columns without any value have no type, and nothing to say.
@@ -309,8 +310,3 @@ class LimitState(_core.LimitState):
         logs = None if log_density is None else np.ascontiguousarray(log_density, dtype=np.float64).reshape(-1)
         found: dict[str, Any] = json.loads(super()._estimate(self._array(points), logs, level))
         return found
-
-
-def _has_arrow(table: Any) -> bool:
-    """Whether pandas can hand out Arrow data: from 2.2 on, if pyarrow is installed."""
-    return hasattr(table, "__arrow_c_stream__") and importlib.util.find_spec("pyarrow") is not None

@@ -417,7 +417,7 @@ def test_lists_of_other_names_are_read_and_must_be_equally_long(tmp_path) -> Non
     (tmp_path / "own.json").write_text(json.dumps([{**one, "x": ["far"] * len(one["x"])} for one in vehicles.to_dicts()]))
     with pytest.raises(lanesweep.InputError, match=r"vehicle_id a, time_s 0.0: `x_m` is 'far'; expected a number"):
         lists(tmp_path / "own.json", columns)
-    with pytest.raises(lanesweep.UsageError, match="no column of tracks `x`; there are vehicle_id"):
+    with pytest.raises(lanesweep.InputError, match="`x`: it is no column of tracks; there are vehicle_id"):
         lists(tmp_path / "own.json", {"x": "x"})
     fixed = vehicles.head(1).with_columns(pl.col("t", "x", "y").list.to_array(2))
     fixed.write_parquet(tmp_path / "own.parquet")

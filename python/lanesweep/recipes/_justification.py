@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import polars as pl
 
-from .._core import InputError
-from .._run import one_of
 from ..options import Criterion
 from . import _clusters
-from ._shared import extra, table, within
-
-if TYPE_CHECKING:
-    import polars as pl
+from ._shared import InputError, check_names, table, within
 
 
 class Justification(NamedTuple):
@@ -47,8 +43,6 @@ def justification(
     Of a decomposition the variant `KEY-cv` is scored, whose basis has not seen the scenarios. `limits` are yours, by the
     quantity: ``{"recall": (0.9, 1.0), "S'/S": (0.8, 1.25)}``. No standard sets them.
     """
-    with extra():
-        import polars as pl
     within(0.5, 0.9999, level=level)
     rows = table(lanes, "id", "variant", "headway", "model", criterion).filter(model=model)
     known = rows["variant"].cast(pl.String)
@@ -62,8 +56,7 @@ def justification(
     counts = both.group_by("id", maintain_order=True).agg(**sums)
     tp, fn, fp, runs = (counts[name].cast(pl.Int64).to_numpy() for name in sums)
     scores = _scores(tp, fn, fp, runs, level)
-    for name in limits or {}:
-        one_of(name, scores, "quantity")
+    check_names(limits or (), scores, "quantity")
     inside = {name: _within(scores[name], ends) for name, ends in (limits or {}).items()}
     rows_of = [(name, variant, *value, inside.get(name)) for name, value in scores.items()]
     schema = {"quantity": pl.String, "variant": pl.String, "value": pl.Float64, "low": pl.Float64, "high": pl.Float64, "within": pl.String}

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+import polars as pl
 
-from .._core import InputError, UsageError
-from .._run import one_of
 from ..options import Criterion
-from ._shared import extra, table, within
-
-if TYPE_CHECKING:
-    import polars as pl
+from ._shared import InputError, UsageError, check_names, extra, table, within
 
 
 def failure_map(rows: Any, x: str, y: str, *, criterion: Criterion = "collision", bins: int = 20) -> pl.DataFrame:
@@ -22,8 +18,6 @@ def failure_map(rows: Any, x: str, y: str, *, criterion: Criterion = "collision"
 
     `rows` are those of `sample(rows=…)`. The cells divide the range of the rows; lanes without a finite `x` and `y` are in none.
     """
-    with extra():
-        import polars as pl
     within(1, 10_000, bins=bins)
     lanes = table(rows, "model", criterion, x, y).cast({x: pl.Float64, y: pl.Float64}).filter(pl.col(x).is_finite() & pl.col(y).is_finite())
     if lanes.is_empty():
@@ -47,13 +41,11 @@ def worst(rows: Any, count: int = 20, *, criterion: Criterion = "collision") -> 
 
     `rows` are those of `sample(failures=…)`, `sample(rows=…)` or `simulate`.
     """
-    with extra():
-        import polars as pl
     near, slow = pl.col("min_ttc_s"), -pl.col("impact_closing_speed_mps").abs()
     # The smallest is the worst.
     order = {"collision": [slow, near], "ttc": [near, slow], "btn": [-pl.col("max_btn"), slow]}
     within(1, float("inf"), count=count)
-    one_of(criterion, get_args(Criterion), "criterion")
+    check_names([criterion], order, "criterion")
     lanes = table(rows, "model", "min_ttc_s", "impact_closing_speed_mps", may_be_empty=True)
     lanes = lanes.sort("model", *order[criterion], nulls_last=True, maintain_order=True)
     return lanes.group_by("model", maintain_order=True).head(count)
@@ -101,10 +93,7 @@ def delta_v(
     vehicles that overlapped along the road by more than a time step's way before, and for one in which they move apart. `rows` are those
     of `simulate` or `sample`; `dt_s` is the time step of their profile: 0.1 of `jrc-2021`.
     """
-    with extra():
-        import polars as pl
     within(1, 1e6, ego_kg=ego_kg, other_kg=other_kg)
-    within(0, 1, restitution=restitution, dt_s=dt_s)
     lanes = table(rows, "impact_closing_speed_mps", "contact_type", "min_gap_m", may_be_empty=True)
     closing = pl.col("impact_closing_speed_mps").cast(pl.Float64)
     of_all = (1.0 + restitution) * closing / (ego_kg + other_kg)
@@ -117,7 +106,8 @@ def delta_v(
 
 def injury_risk(delta_v_mps: npt.ArrayLike, curve: Curve = "nhtsa-2022-frontal-mais3") -> npt.NDArray[np.float64]:
     """Return the risk of an injury at changes of speed of a car, by a curve of `INJURY_CURVES`; NaN beyond its data."""
-    of = INJURY_CURVES[one_of(curve, INJURY_CURVES, "curve")]
+    check_names([curve], INJURY_CURVES, "curve")
+    of = INJURY_CURVES[curve]
     change = np.asarray(delta_v_mps, dtype=np.float64)
     a, b = of.logistic or (0.0, 0.0)
     risk = 1.0 / (1.0 + np.exp(a - b * change / _MPH)) if of.logistic else (change / of.valid_to_mps) ** 4
@@ -131,7 +121,6 @@ def largest_gap(points: Any, ranges: Mapping[str, tuple[float, float]] | None = 
     with its interval (Clopper and Pearson). Of equally large intervals it is the one with the most draws, or the lowest.
     """
     with extra():
-        import polars as pl
         import polars.selectors as select
         from statsmodels.stats.proportion import proportion_confint
     cases = table(points, *(ranges or ()))

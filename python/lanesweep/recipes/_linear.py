@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple, get_args
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+import polars as pl
 
 from .. import _verbs
-from .._core import InputError
-from .._run import one_of
 from ..options import Criterion
-from ._shared import extra, quiet, table
+from ._shared import InputError, check_names, extra, quiet, table
 
-if TYPE_CHECKING:
-    import polars as pl
 
 Array = npt.NDArray[np.float64]
 INSTANTS, KNOTS = 50, 4
@@ -58,7 +55,7 @@ def found_emphasis(
     """
     with extra():
         import cma
-    one_of(criterion, get_args(Criterion), "criterion")
+    check_names([criterion], ["collision", "ttc", "btn"], "criterion")
     rows = table(scenarios, "category", "target_v", "fps")
     z, category = _vectors(rows), _category(rows)
     series, numbers = _LAYOUT[category]
@@ -109,13 +106,11 @@ def _category(rows: pl.DataFrame) -> str:
     found = rows["category"].unique().to_list()
     if len(found) != 1:
         raise InputError(f"there are scenarios of {', '.join(map(str, found))}\n  help: give those of one category")
-    return one_of(str(found[0]), _LAYOUT, "category")
+    return str(found[0])
 
 
 def _scenarios(rows: pl.DataFrame, z: Array) -> pl.DataFrame:
     """The scenarios of vectors, with sizes and sides of the rows."""
-    import polars as pl
-
     category = _category(rows)
     series, numbers = _LAYOUT[category]
     found = {name: z[:, INSTANTS * at : INSTANTS * (at + 1)] for at, name in enumerate(series)}
@@ -134,8 +129,6 @@ def _scenarios(rows: pl.DataFrame, z: Array) -> pl.DataFrame:
 
 def _scores(rows: pl.DataFrame, described: Mapping[str, pl.DataFrame], criterion: Criterion) -> list[float]:
     """Mean F1 of every S' over the drivers for which S fails in ten scenarios."""
-    import polars as pl
-
     data: Any = rows
     # A bad proposal jumps sideways, and is scored all the same.
     with quiet():

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import functools
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 import numpy as np
+import polars as pl
 
-from .._core import InputError
 from ..options import Path
-from ._shared import extra
-
-if TYPE_CHECKING:
-    import polars as pl
+from ._shared import InputError, extra
 
 
 def logical_scenario(file: Path, *, draws: int | None = None, seed: int | None = None) -> pl.DataFrame:
@@ -23,15 +20,12 @@ def logical_scenario(file: Path, *, draws: int | None = None, seed: int | None =
     Columns have the names and units of the file. `draws` and `seed` are by default its `numberOfTestRuns` and `randomSeed`.
     Distributions are truncated to their ranges. Expressions and parameter references are refused.
     """
-    with extra():
-        import polars as pl
     root = ElementTree.parse(file).getroot()
     listed, random = root.find("*/Deterministic"), root.find("*/Stochastic")
-    if (listed is None) == (random is None):
-        raise InputError(f"{file}: expected a ParameterValueDistribution with either Deterministic or Stochastic values")
-    if listed is not None:
+    if listed is not None and random is None:
         return functools.reduce(lambda one, other: one.join(other, how="cross"), map(_values, listed))
-    assert random is not None
+    if random is None or listed is not None:
+        raise InputError(f"{file}: expected a ParameterValueDistribution with either Deterministic or Stochastic values")
     # A seed is a double. The hash of a whole one is itself.
     own = abs(hash(float(random.get("randomSeed", 0.0))))
     generator = np.random.default_rng(own if seed is None else seed)
@@ -41,8 +35,6 @@ def logical_scenario(file: Path, *, draws: int | None = None, seed: int | None =
 
 def _values(distribution: Element) -> pl.DataFrame:
     """The values of one parameter, or the sets of several."""
-    import polars as pl
-
     if distribution.tag == "DeterministicMultiParameterDistribution":
         sets = [{one.attrib["parameterRef"]: _value(one) for one in each} for each in distribution.iter("ParameterValueSet")]
         return pl.DataFrame(sets, infer_schema_length=None)

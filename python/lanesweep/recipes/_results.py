@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
+
+import polars as pl
 
 from .. import _verbs
-from .._core import InputError
-from .._result import temporary
-from .._run import one_of
 from .._simulate import simulate
 from ..options import Path as PathLike
-from ._shared import extra, table
+from ._shared import InputError, check_names, extra, table
 
-if TYPE_CHECKING:
-    import polars as pl
 
 #: Quantities of `compare_results`, a cause before its effects, with the differences that count as none: half of a time step of
 #: 0.1 s, 0.1 m and 0.2 m/s.
@@ -69,10 +65,8 @@ def compare_results(
     out is not compared.
     """
     with extra():
-        import polars as pl
         from statsmodels.stats.proportion import proportion_confint
-    for name in tolerances:
-        one_of(name, TOLERANCES, "quantity to compare")
+    check_names(tolerances, TOLERANCES, "quantity to compare")
     given, own = table(theirs, "id", "collision"), table(cases, "id")
     results = _as_values(given)
     both = results.join(_lanes(own, results.columns, model, profile), on="id", suffix="_ours", validate="1:1")
@@ -98,14 +92,10 @@ def compare_results(
 
 def _lanes(cases: pl.DataFrame, columns: list[str], model: str, profile: PathLike) -> pl.DataFrame:
     """The driver's outcomes. An event that does not happen has an infinite time."""
-    import polars as pl
-
     found = table(simulate(cases, models=model, profile=profile))
     if "braking_s" in columns:
-        keep = temporary()
-        file = Path(keep.name) / "cases.parquet"
-        cases.drop("answer", strict=False).write_parquet(file)
-        traces = (_verbs.trace(table=file, row=row + 1, models=model, profile=profile).document for row in range(len(cases)))
+        rows: Any = cases.drop("answer", strict=False).iter_rows(named=True)
+        traces = (_verbs.trace(table=row, models=model, profile=profile).document for row in rows)
         braking = [next((step["t_s"] for step in of["steps"] if "braking" in (step["mark"] or "")), None) for of in traces]
         found = found.with_columns(braking_s=pl.Series(braking, dtype=pl.Float64))
     times = [name for name in ("reaction_s", "braking_s", "contact_s") if name in found.columns]
@@ -114,8 +104,6 @@ def _lanes(cases: pl.DataFrame, columns: list[str], model: str, profile: PathLik
 
 def _as_values(rows: pl.DataFrame) -> pl.DataFrame:
     """Numbers, and texts as ids. Vehicles that touch have no gap left, and others never touch."""
-    import polars as pl
-
     known = [name for name in TOLERANCES if name in rows.columns]
     if not rows["id"].is_unique().all():
         raise InputError(f"the id {rows.filter(pl.col('id').is_duplicated())['id'][0]} occurs twice")

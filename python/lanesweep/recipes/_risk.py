@@ -2,36 +2,29 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import numpy as np
+import polars as pl
 
 from .. import _verbs
-from .._core import InputError, UsageError
 from .._result import Result
 from ..options import Criterion
 from ..options import Path as PathLike
 from . import _clusters
-from ._shared import extra, table, within
-
-if TYPE_CHECKING:
-    import polars as pl
+from ._shared import InputError, UsageError, table, within
 
 
 def risk(densities: PathLike | Mapping[str, PathLike], **options: Any) -> pl.DataFrame:
     """Sample every density of a fit, or densities by their names, and return the estimates of all with the name of the density.
 
     `options` are those of `sample`; of several densities, each has `rows`, `failures` and `out` with its name: ``rows-cut-in-2.parquet``.
-    `replayed_ratio` is S'/S, the error of the parameterization itself; `sampled_ratio` is the rate of
-    the density over that of the recorded scenarios, P/S. Both have intervals over scenarios (`…_low`, `…_high`).
+    `replayed_ratio` is S'/S, the error of the parameterization itself; `sampled_ratio` is the rate of the density over that of the
+    recorded scenarios, P/S. Both have intervals over scenarios (`…_low`, `…_high`).
     """
-    with extra():
-        import polars as pl
-    single = {Path(densities).stem: densities} if isinstance(densities, (str, os.PathLike)) and not isinstance(densities, Result) else densities
-    named = single.densities if isinstance(single, Result) else single
+    of_fit = densities.densities if isinstance(densities, Result) else densities
+    named = of_fit if isinstance(of_fit, Mapping) else {Path(of_fit).stem: of_fit}
     if not named:
         raise UsageError("`densities` has none\n  help: give a fit, a density file, or several by their names")
     files = {key: Path(options[key]) for key in ("rows", "failures", "out") if options.get(key) is not None and len(named) > 1}
@@ -48,18 +41,15 @@ def failure_ratio(one: Any, other: Any, *, criterion: Criterion = "collision", b
     Both are rows of `sample(rows=…)` of one density with the same seed, or parts of them: ``rows.filter(model="FSM")``. Of `study` rows give
     ``by="id"``.
     """
-    with extra():
-        import polars as pl
     within(0.5, 0.9999, level=level)
     first, second = (table(rows, by, "headway", criterion) for rows in (one, other))
     if any(rows.select(by, "headway").is_duplicated().any() for rows in (first, second)):
         raise InputError(f"a side has several lanes of one {by} and headway\n  help: filter its rows by model, and by variant")
-    both = first.join(second, on=[by, "headway"], suffix="_other", validate="1:1", nulls_equal=True)
-    # The weight and the parameters of the sample.
-    drawn = first.columns[first.columns.index("weight") :] if "weight" in first.columns else []
-    pairs = ((both[name], both[f"{name}_other"]) if name in second.columns else (0, 1) for name in drawn)
-    is_same = all(np.allclose(ours, theirs, rtol=1e-6, atol=0, equal_nan=True) for ours, theirs in pairs)
-    if both.height < max(first.height, second.height) or not is_same:
+    # The weight and the parameters of a sample, in the precision of its lanes.
+    drawn = first.columns[[*first.columns, "weight"].index("weight") :]
+    known: Any = dict.fromkeys((name for name in drawn if name in second.columns), pl.Float32)
+    both = first.cast(known).join(second.cast(known), on=[by, "headway", *known], suffix="_other", validate="1:1", nulls_equal=True)
+    if both.height < max(first.height, second.height) or len(known) < len(drawn):
         raise InputError("the two have other cases\n  help: give one driver each, of one density and seed")
     found = []
     for name, part in [("all", both), *((str(key[0]), of) for key, of in both.group_by("headway", maintain_order=True))]:

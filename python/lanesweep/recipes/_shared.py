@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
+import difflib
 import logging
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import polars as pl
+import polars.selectors as select
 
 from .. import _verbs
-from .._core import InputError, UsageError
-from .._result import temporary
-from .._run import one_of
+from .._core import InputError as InputError
+from .._core import UsageError as UsageError
 from ..options import Path as PathLike
-
-if TYPE_CHECKING:
-    import polars as pl
 
 
 @contextmanager
@@ -42,6 +42,14 @@ def quiet() -> Iterator[None]:
         log.setLevel(level)
 
 
+def check_names(names: Iterable[str], known: Iterable[str], what: str) -> None:
+    """Refuse names that are none of the known ones; the error has the nearest of these."""
+    for name in names:
+        if name not in (all_known := [*known]):
+            help = "".join(f"\n  help: did you mean `{near}`?" for near in difflib.get_close_matches(str(name), all_known, 1))
+            raise UsageError(f"there is no {what} `{name}`; there are {', '.join(all_known)}{help}")
+
+
 def within(low: float, high: float, **given: float) -> None:
     """Refuse arguments out of range."""
     for name, value in given.items():
@@ -55,22 +63,14 @@ def table(rows: Any, *needs: str, may_be_empty: bool = False) -> pl.DataFrame:
     It has the columns `needs`. NaN is no value. Verdicts, which are 0 and 1 in CSV, become true and false; nested fields and infinite
     numbers, which are texts in JSON, are those of Parquet.
     """
-    with extra():
-        import polars as pl
-        import polars.selectors as select
     if isinstance(rows, (str, os.PathLike)):
         path = Path(rows)
         readers = {".csv": partial(pl.read_csv, infer_schema_length=None), ".jsonl": partial(pl.read_ndjson, infer_schema_length=None)}
         readers[".parquet"] = partial(pl.read_parquet)
-        try:
-            rows = readers[path.suffix](path)
-        except KeyError:
-            raise UsageError(f"{path}: a table ends in {', '.join(readers)}") from None
-        except pl.exceptions.PolarsError as error:
-            raise InputError(f"{path}: no table, or truncated ({error})\n  help: write the file again") from None
+        check_names([path.suffix], readers, f"reader of {path}:")
+        rows = readers[path.suffix](path)
     found = pl.DataFrame(dict(rows) if isinstance(rows, Mapping) else rows, strict=False).unnest(select.struct(), separator="_")
-    for name in needs:
-        one_of(name, found.columns, "column")
+    check_names(needs, found.columns, "column")
     if found.is_empty() and not may_be_empty:
         raise InputError("the table has no rows\n  help: give at least one")
     infinite = [of.name for of in found.select(select.string()) if of.str.contains("^-?Infinity$").any()]
@@ -81,11 +81,8 @@ def table(rows: Any, *needs: str, may_be_empty: bool = False) -> pl.DataFrame:
 
 def case_of(case: Mapping[str, Any], varied: Mapping[str, Any]) -> dict[str, Any]:
     """Return a case without its id; its names, and those of what varies, must be quantities of a case."""
-    known = [*_verbs.Case.__annotations__]
     given = {name: value for name, value in case.items() if name != "id"}
-    for name in [*given, *varied]:
-        if re.sub("_(kmh|mps2?|m|s)$", "", name) not in known:
-            one_of(name, known, "quantity of a case")
+    check_names((re.sub("_(kmh|mps2?|m|s)$", "", name) for name in [*given, *varied]), _verbs.Case.__annotations__, "quantity of a case")
     if not varied:
         raise UsageError("nothing varies\n  help: give at least one quantity")
     return given
@@ -93,17 +90,13 @@ def case_of(case: Mapping[str, Any], varied: Mapping[str, Any]) -> dict[str, Any
 
 def answers(cases: pl.DataFrame, profile: PathLike) -> pl.DataFrame:
     """Return the computed answer of every case, a column `verdict` and one per driver; no values where a row is no case."""
-    with extra():
-        import polars as pl
-    keep = temporary()
-    found = Path(keep.name) / "answers.parquet"
     try:
         # A draw that is no case is counted, not reported.
         with quiet():
-            _verbs.check(cases, nominal=True, profiles=profile, rows=found)
+            found = table(_verbs.check(cases, nominal=True, profiles=profile).table("cases"))
     except InputError:
         # No row is a case: say what is wrong with the first one.
         _verbs.check(cases, row=1, profiles=profile)
         raise
     every = pl.DataFrame({"row": range(1, len(cases) + 1)}, schema={"row": pl.Int64})
-    return every.join(pl.read_parquet(found), on="row", how="left", maintain_order="left").drop("row")
+    return every.join(found, on="row", how="left", maintain_order="left").drop("row")

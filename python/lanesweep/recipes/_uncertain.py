@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+import polars as pl
 
-from .._core import InputError
 from ..options import Path
-from ._shared import answers, case_of, extra, within
-
-if TYPE_CHECKING:
-    import polars as pl
+from ._shared import InputError, answers, case_of, extra, within
 
 
 class Uncertainty(NamedTuple):
@@ -52,7 +49,6 @@ def uncertain(
     are of the model: they do not say whether your sensors have these errors.
     """
     with extra():
-        import polars as pl
         from scipy import stats
     within(1, float("inf"), draws=draws)
     case = case_of(case, errors)
@@ -82,7 +78,6 @@ def uncertain(
 
 def _shares(what: str, names: list[str], counts: list[int], of: int) -> pl.DataFrame:
     with extra():
-        import polars as pl
         from statsmodels.stats.proportion import proportion_confint
     if not of:
         names, counts, of = [], [], 1
@@ -97,8 +92,6 @@ def _indices(inputs: pl.DataFrame, seed: int) -> pl.DataFrame:
     There are a hundred bins, or fewer of ten draws each. The index is the correlation ratio, corrected for the number of bins (Kelley's
     epsilon squared); its interval comes from 200 bootstrap samples.
     """
-    with extra():
-        import polars as pl
     names, is_own = inputs.columns[:-1], inputs["is_own"].to_numpy().astype(np.float64)
     count = len(is_own)
     if min(is_own.sum(), count - is_own.sum()) < 30:

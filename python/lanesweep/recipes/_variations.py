@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import polars as pl
 
 from ..options import Path
 from ._shared import answers, case_of, extra, within
 
-if TYPE_CHECKING:
-    import polars as pl
 
 Points = npt.NDArray[np.float64]
 #: Answers to points in units of the ranges, empty where a point is no case.
@@ -36,8 +35,6 @@ def variations(
     the ends in turn. `boundary` is the maximum number of pairs with different answers, a thousandth of the ranges apart at most.
     Points that are no case, and repeated ends of a single range, have no row.
     """
-    with extra():
-        import polars as pl
     within(0, float("inf"), inside=inside, edge=edge, outside=outside, boundary=boundary)
     known = case_of(case, ranges)
     low, high = np.array(list(ranges.values()), dtype=np.float64).T

@@ -7,9 +7,8 @@ from collections.abc import Mapping
 
 import polars as pl
 
-from .._run import one_of
 from ..options import Path as File
-from ._table import COLUMNS, canonical, json_lists, json_vehicles, number, read_table, unpacked
+from ._table import COLUMNS, bad, canonical, json_lists, json_vehicles, number, read_table, unpacked
 
 _SWIFTRAJ = {
     "vehicle_id": "vehicle_id",
@@ -42,8 +41,8 @@ def lists(path: File, columns: Mapping[str, str]) -> pl.DataFrame:
     polars.DataFrame
         These columns, a row per item of the lists; what is no list is repeated.
     """
-    for ours in columns.values():
-        one_of(ours, COLUMNS, "column of tracks")
+    if unknown := set(columns.values()) - set(COLUMNS):
+        raise bad(path, f"`{min(unknown)}`", f"it is no column of tracks; there are {', '.join(COLUMNS)}", "give one of these")
     if os.fspath(path).endswith(".parquet"):
         return canonical(path, unpacked(path, read_table(path), columns))
     return canonical(path, json_lists(path, json_vehicles(path), columns))

@@ -10,7 +10,7 @@ import os
 import re
 import xml.etree.ElementTree as ET
 import zlib
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import IO, Any, cast
 
@@ -112,18 +112,14 @@ def json_vehicles(path: File, key: str = "") -> list[dict[str, Any]]:
     return found
 
 
-def _check_columns(path: File, columns: Mapping[str, str], there: Collection[str]) -> None:
+def unpacked(path: File, vehicles: pl.DataFrame, columns: Mapping[str, str], there: Iterable[str] = ()) -> pl.DataFrame:
+    """A row per item of the lists of the vehicles; `columns` has our names by theirs, which are among those that are `there`."""
     for theirs in columns:
-        if theirs not in there:
-            raise bad(path, f"column `{theirs}`", f"not there; the file has {', '.join(there)}", "check that it has this format")
-
-
-def unpacked(path: File, vehicles: pl.DataFrame, columns: Mapping[str, str]) -> pl.DataFrame:
-    """A row per item of the lists of the vehicles; `columns` has our names by theirs."""
-    _check_columns(path, columns, vehicles.columns)
-    arrays = [name for name, dtype in vehicles.schema.items() if isinstance(dtype, pl.Array)]
-    vehicles = vehicles.with_columns(pl.col(name).arr.to_list() for name in arrays)
+        if theirs not in vehicles.columns:
+            problem = f"not there; the file has {', '.join(there or vehicles.columns)}"
+            raise bad(path, f"column `{theirs}`", problem, "check that it has this format")
     frame = vehicles.select(pl.col(theirs).alias(ours) for theirs, ours in columns.items())
+    frame = frame.with_columns(pl.col(name).arr.to_list() for name, dtype in frame.schema.items() if isinstance(dtype, pl.Array))
     packed = [name for name, dtype in frame.schema.items() if isinstance(dtype, pl.List)]
     if not packed:
         return frame
@@ -138,17 +134,15 @@ def unpacked(path: File, vehicles: pl.DataFrame, columns: Mapping[str, str]) -> 
 
 def json_lists(path: File, vehicles: list[dict[str, Any]], columns: Mapping[str, str]) -> pl.DataFrame:
     """The same of vehicles from JSON."""
-    if vehicles:
-        _check_columns(path, columns, dict.fromkeys(key for vehicle in vehicles for key in vehicle))
-    frame = {}
-    for theirs in columns:
+    frame, there = {}, dict.fromkeys(key for vehicle in vehicles for key in vehicle)
+    for theirs in [of for of in columns if of in there or not vehicles]:
         cells = [vehicle.get(theirs) for vehicle in vehicles]
         packed = any(isinstance(cell, list) for cell in cells)
         for number, cell in enumerate(cells, 1):
             if packed != isinstance(cell, list):
                 raise bad(path, f"vehicle {number} of the list", f"`{theirs}` is {cell!r:.40}", "give every vehicle the same keys")
         frame[theirs] = pl.Series(theirs, cells, dtype=pl.List(pl.String) if packed else pl.String, strict=False)
-    return unpacked(path, pl.DataFrame(frame), columns)
+    return unpacked(path, pl.DataFrame(frame), columns, there)
 
 
 def canonical(path: File, frame: pl.DataFrame) -> pl.DataFrame:
