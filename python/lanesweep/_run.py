@@ -265,7 +265,7 @@ def run(function: str, arguments: Mapping[str, Any]) -> Result:
     try:
         code, text, document, frames = _core.run(function, call, {name: _words(value) for name, value in values.items()}, move, on_line)
     except _core.LanesweepError as error:
-        error.args, error.problem = (_in_words(str(error)),), _in_words(error.problem)
+        error.args, error.problem = (_in_words(str(error)),), _in_words(getattr(error, "problem", ""))
         raise
     finally:
         close()

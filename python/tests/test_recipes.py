@@ -139,7 +139,7 @@ def test_the_cases_of_a_pair_have_two_answers_of_check() -> None:
     assert pair["gap_m"].to_list() == pytest.approx([13.87, 13.87], abs=0.04)
     nearer = recipes.variations(CASE, {"gap_m": (0, 40)}, inside=4, edge=0, outside=2, boundary=0)
     assert nearer.filter(pl.col("id").str.starts_with("outside")).height == 1
-    ends = recipes.variations(CASE | {"id": "own"}, {"gap_m": (8, 40)}, inside=0, edge=16, outside=0)
+    ends = recipes.variations(gaps.row(0, named=True), {"gap_m": (8, 40)}, inside=0, edge=16, outside=0)
     assert ends.select("id", "gap_m").rows() == [("edge-1", 8.0), ("edge-2", 40.0)]
 
 
@@ -298,6 +298,7 @@ WRONG = [
     (lambda: recipes.failure_map(_rows(), "x", "y"), "no column `y`; there are id"),
     (lambda: recipes.risk({}), "`densities` has none"),
     (lambda: recipes.fit_description(_rows(), 2), "give those of one category"),
+    (lambda: recipes.fit_description(_rows(category="cut-in"), 2), "no category `cut-in`.*\\n.*`cut_in`"),
     (lambda: recipes.found_emphasis(_rows(), 2, criterion="tttc"), "no criterion `tttc`.*\n.*`ttc`"),
     (lambda: recipes.worst(_rows(), criterion="collison"), "no criterion `collison`.*\n.*`collision`"),
     (lambda: recipes.worst(_rows(), 0), "`count` is 0"),

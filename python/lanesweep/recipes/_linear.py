@@ -104,6 +104,7 @@ def _decoded(description: Description, z: Array) -> Array:
 
 def _category(rows: pl.DataFrame) -> str:
     found = rows["category"].unique().to_list()
+    check_names(found, _LAYOUT, "category")
     if len(found) != 1:
         raise InputError(f"there are scenarios of {', '.join(map(str, found))}\n  help: give those of one category")
     return str(found[0])

@@ -16,8 +16,7 @@ import polars as pl
 import polars.selectors as select
 
 from .. import _verbs
-from .._core import InputError as InputError
-from .._core import UsageError as UsageError
+from .._core import InputError as InputError, UsageError as UsageError
 from ..options import Path as PathLike
 
 
@@ -80,8 +79,8 @@ def table(rows: Any, *needs: str, may_be_empty: bool = False) -> pl.DataFrame:
 
 
 def case_of(case: Mapping[str, Any], varied: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a case without its id; its names, and those of what varies, must be quantities of a case."""
-    given = {name: value for name, value in case.items() if name != "id"}
+    """Return a case without its id and answer; its names, and those of what varies, must be quantities of a case."""
+    given = {name: value for name, value in case.items() if name not in ("id", "answer")}
     check_names((re.sub("_(kmh|mps2?|m|s)$", "", name) for name in [*given, *varied]), _verbs.Case.__annotations__, "quantity of a case")
     if not varied:
         raise UsageError("nothing varies\n  help: give at least one quantity")
