@@ -422,6 +422,8 @@ def test_lists_of_other_names_are_read_and_must_be_equally_long(tmp_path) -> Non
     fixed = vehicles.head(1).with_columns(pl.col("t", "x", "y").list.to_array(2))
     fixed.write_parquet(tmp_path / "own.parquet")
     assert_frame_equal(lists(tmp_path / "own.parquet", columns), expected.head(2))
+    fixed.with_columns(size=pl.lit(math.nan)).write_parquet(tmp_path / "own.parquet")
+    assert lists(tmp_path / "own.parquet", columns)["length_m"].to_list() == [None, None]
     (tmp_path / "own.json").write_text("[]")
     with pytest.raises(lanesweep.InputError, match="no vehicle"):
         lists(tmp_path / "own.json", {})

@@ -23,8 +23,7 @@ class Uncertainty(NamedTuple):
     drivers : DataFrame
         Per driver, the draws in which it avoids the collision, of those in which an ego that never reacts collides.
     indices : DataFrame
-        Per input, the first-order index: the fraction of the variance of the answer that its error alone explains, with the
-        half-width of its interval (95 %).
+        Per input, the first-order index, the fraction of the answer's variance that its error alone explains, ± `half_width` (95 %).
     draws : DataFrame
         Every draw with its answer; null where the numbers are no case.
     """

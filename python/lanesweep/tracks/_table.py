@@ -146,7 +146,8 @@ def json_lists(path: File, vehicles: list[dict[str, Any]], columns: Mapping[str,
 
 
 def canonical(path: File, frame: pl.DataFrame) -> pl.DataFrame:
-    """The columns in their order and with their types; what is no finite number, or no size, is an error."""
+    """The columns in their order and with their types, NaN as no value; what else is no finite number, or no size, is an error."""
+    frame = frame.with_columns(pl.col(pl.Float32, pl.Float64).fill_nan(None))
     names = [name for name in COLUMNS if name in frame.columns]
     types = {name: pl.String if name in _TEXTS else pl.Int64 if name == "frame" else pl.Float64 for name in names}
     table = frame.select(pl.col(name).cast(dtype, strict=False) for name, dtype in types.items())
