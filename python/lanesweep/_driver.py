@@ -198,7 +198,10 @@ def _address(driver: Driver) -> int:
             ) from None
         key = digest(found)
         if key not in _compiled:
-            _compiled[key] = numba.cfunc(SIGNATURE)(found)
+            try:
+                _compiled[key] = numba.cfunc(SIGNATURE)(found)
+            except Exception as error:
+                raise _core.UsageError(f"{of} is not compiled by numba: {error}\n  help: its signature is {SIGNATURE}") from error
         found = _compiled[key]
     if isinstance(found, CFuncPtr):
         found = ctypes.cast(found, ctypes.c_void_p).value

@@ -66,7 +66,7 @@ class Figure:
         panels = list(dict.fromkeys(record["panel"] for record in records))
         columns = min(len(panels), 3)
         figure, axes = plt.subplots(
-            -(-len(panels) // columns), columns, squeeze=False, figsize=(4 * columns + 2, 3.5 * -(-len(panels) // columns)), layout="constrained"
+            -(-len(panels) // columns), columns, squeeze=False, figsize=(4 * columns + 2, 3.5 * -(-len(panels) // columns) + 1), layout="constrained"
         )
         for axis in axes.flat[len(panels) :]:
             axis.remove()
@@ -82,7 +82,7 @@ class Figure:
             if names and np.isnan(own[0]["y"]):
                 axis.set_yticks([-at for at in range(len(names))], names)
             axis.set(title=panel, xlabel=own[0]["x_quantity"], ylabel=own[0]["y_quantity"])
-        axes.flat[0].legend(fontsize="small")
+        figure.legend(*axes.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=columns, fontsize="small")
         # What the figure says of itself, synthetic data first of all.
         said = [re.search(f"<{tag}>(.*?)</{tag}>", self.svg, re.DOTALL) for tag in ("title", "desc")]
         title, about = (html.unescape(found[1]) if found else "" for found in said)

@@ -8,7 +8,9 @@ import json
 import logging
 import numbers
 import os
+import re
 import sys
+import tempfile
 import warnings
 from collections.abc import Callable, Collection, Iterator, KeysView, Mapping, Sequence, Set, ValuesView
 from pathlib import Path
@@ -119,6 +121,8 @@ def _scalar(value: Any, name: str) -> Any:
         return float(value)
     if isinstance(value, numbers.Number):
         return str(value)
+    if is_table(value):
+        raise _core.UsageError(f"`{name}` is a table in memory\n  help: write it into a file first (Parquet, CSV), and give its path")
     raise TypeError(f"`{name}` has the value {value!r:.80}; give a number, a text, a path, or a list of these that holds no lists")
 
 
@@ -195,6 +199,12 @@ def _shown(value: Any) -> str:
     return json.dumps(str(value), ensure_ascii=False) if isinstance(value, (str, Path)) else repr(value)
 
 
+def _in_words(text: str) -> str:
+    """Name the argument in place of the temporary file that holds its row or table."""
+    folder = re.escape(os.path.join(tempfile.gettempdir(), "lanesweep-"))
+    return re.sub(rf"{folder}\w+[/\\](scenarios|file|table)\.(csv, line 2\b|csv|parquet)", r"`\1`", text)
+
+
 #: Names of results in a temporary folder, without the argument `out`.
 _OUT = {"study": "study", "tracks": "tracks", "mine": "scenarios.jsonl", "fit": "densities", "sample": "sample", "map": "map"}
 
@@ -213,7 +223,8 @@ def run(function: str, arguments: Mapping[str, Any]) -> Result:
         given["models"] = names_of(given["models"])
     keep = None
     for name in ("scenarios", "file", "table"):
-        value = given.get(name)
+        value: Any = given.get(name)
+        value = value._asdict() if hasattr(value, "_asdict") else value  # a row of `itertuples`
         is_row = isinstance(value, Mapping) or getattr(value, "ndim", 2) == 1
         if is_row and name != "scenarios":
             keep = keep or temporary()
@@ -221,6 +232,8 @@ def run(function: str, arguments: Mapping[str, Any]) -> Result:
         elif is_table(value):
             keep = keep or temporary()
             given[name] = table_file(value, Path(keep.name) / name)
+        elif isinstance(value, (tuple, list)):
+            raise _core.UsageError(f"`{name}` is {value!r:.80}\n  help: give a file, a table, or a row with its names: a mapping")
     external = given.get("external")
     tables = external if isinstance(external, Mapping) else {"external": external} if is_table(external) else {}
     if tables:
@@ -241,6 +254,7 @@ def run(function: str, arguments: Mapping[str, Any]) -> Result:
     messages: list[str] = []
 
     def on_line(level: str, line: str) -> None:
+        line = _in_words(line)
         messages.append(line)
         on_message(level, line)
 
@@ -250,8 +264,11 @@ def run(function: str, arguments: Mapping[str, Any]) -> Result:
     call = os.fsencode(f"lanesweep.{function}({shown})").decode(errors="replace")
     try:
         code, text, document, frames = _core.run(function, call, {name: _words(value) for name, value in values.items()}, move, on_line)
+    except _core.LanesweepError as error:
+        error.args, error.problem = (_in_words(str(error)),), _in_words(getattr(error, "problem", ""))
+        raise
     finally:
         close()
     if code == _NOTHING:
         raise _core.InputError("\n".join(messages) or "there is nothing that can be read")
-    return Result(function, code, text, document, frames, messages, None if path is None else Path(path_of(path, "out")), keep)
+    return Result(function, code, _in_words(text), document, frames, messages, None if path is None else Path(path_of(path, "out")), keep)

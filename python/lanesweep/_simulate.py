@@ -19,7 +19,7 @@ from ._driver import Driver, name_of, names_of, register
 from ._run import on_message, path_of, plain
 
 if TYPE_CHECKING:
-    from .options import Headways, Models, Path
+    from .options import Criterion, Headways, Models, Path
 
 
 def _column(name: str, values: Any) -> Any:
@@ -103,7 +103,7 @@ def simulate(
     Frame
         A row per case, headway and model, the last varying fastest: verdicts, minima and maxima, times in s, speeds in m/s. Lanes
         are in binary32, as in a study. Where `robust` is false, binary64 (`check`, `trace`, ``reference=True``) gives another
-        verdict: the case is within rounding of a limit.
+        verdict: the case is within rounding of a limit. Of a driver of your own it is null.
 
     Raises
     ------
@@ -116,6 +116,8 @@ def simulate(
     >>> lanesweep.simulate(cases, category="cut-in", models="FSM")["collision"]
     array([ True, False])
     """
+    if isinstance(cases, (str, os.PathLike)) or (isinstance(cases, Mapping) and not cases):
+        raise _core.InputError(f"`cases` is {cases!r:.80}\n  help: give a table of cases; `check` and `trace` read files")
     library = type(cases).__module__.split(".")[0]
     if isinstance(cases, Mapping):
         cases = _frame_of(cases)
@@ -124,7 +126,8 @@ def simulate(
         index = cases.index
         counts = type(index).__name__ == "RangeIndex" and index.name is None and index.start == 0 and index.step == 1
         cases = cases.reset_index(drop=counts)
-        if not _has_arrow(cases):
+        if not hasattr(cases, "__arrow_c_stream__") or importlib.util.find_spec("pyarrow") is None:
+            # pandas hands out Arrow data from 2.2 on, if pyarrow is installed.
             cases = _frame_of({name: cases[name].to_numpy() for name in cases.columns})
     elif library == "polars" and hasattr(cases, "schema"):
         # Columns without any value have no type, and nothing to say.
@@ -199,7 +202,7 @@ class LimitState(_core.LimitState):
         density: Path,
         *,
         model: str | Driver = "FSM",
-        criterion: str = "collision",
+        criterion: Criterion = "collision",
         thw: float | str | None = None,
         profile: Path = "paper",
         backend: str = "cpu",
@@ -307,8 +310,3 @@ class LimitState(_core.LimitState):
         logs = None if log_density is None else np.ascontiguousarray(log_density, dtype=np.float64).reshape(-1)
         found: dict[str, Any] = json.loads(super()._estimate(self._array(points), logs, level))
         return found
-
-
-def _has_arrow(table: Any) -> bool:
-    """Whether pandas can hand out Arrow data: from 2.2 on, if pyarrow is installed."""
-    return hasattr(table, "__arrow_c_stream__") and importlib.util.find_spec("pyarrow") is not None

@@ -78,6 +78,11 @@ class Case(TypedDict, total=False):
     """Width of the ego, by default that of every vehicle (m)."""
     lane_width: Number
     """Width of the lanes, by default the scenario's, else 3.5 (m)."""
+    ego_speed_kmh: Float
+    speed_kmh: Float
+    end_speed_kmh: Float
+    ahead_speed_kmh: Float
+    duration: Number
 
 
 def study(

@@ -374,6 +374,9 @@ def test_the_compiled_examples_are_those_in_numpy() -> None:
     sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
     from compiled_driver import FastIDM, policy
 
+    short = type("Short", (lanesweep.Driver,), {"compiled": lambda lanes, stride: None})
+    with pytest.raises(lanesweep.UsageError, match=r"driver Short: `compiled` is not compiled by numba.*\n.*its signature is void\("):
+        outcomes(short())
     ours, theirs = outcomes(FastIDM()), outcomes(IDM())
     assert (ours["collision"] == theirs["collision"]).mean() > 0.99 and np.allclose(ours["min_gap_m"], theirs["min_gap_m"], atol=0.01)
     in_numpy = policy()

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import ast
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import lanesweep
 import numpy as np
 import polars as pl
 import pytest
 from lanesweep import recipes
+from lanesweep.recipes import _shared
 from scipy import stats
 
 CASE = {"category": "cut-in", "ego_speed_kmh": 60, "speed_kmh": 30, "gap_m": 17, "lateral_speed": 1.0}
@@ -85,6 +88,9 @@ def test_infinite_is_a_value_and_empty_is_unknown(cases: pl.DataFrame, theirs: p
     assert found.causes.row(0) == ("min_ttc_s", 1, np.inf, np.inf, np.inf)
     unknown = results.with_columns(min_ttc_s=pl.when(of).then(None).otherwise("min_ttc_s"))
     assert recipes.compare_results(cases, unknown).causes.is_empty()
+    silent = recipes.compare_results(cases, results.with_columns(collision=pl.when(of).then(None).otherwise("collision")))
+    assert (silent.agreement[0], silent.missing) == (1.0, 1)
+    assert recipes.compare_results(cases, results, tolerances={"reaction_s": 0.1}).ignored == ["min_ttc_s"]
 
 
 def test_braking_is_compared_too_and_a_foreign_id_is_refused(cases: pl.DataFrame, tmp_path: Path) -> None:
@@ -133,6 +139,8 @@ def test_the_cases_of_a_pair_have_two_answers_of_check() -> None:
     assert pair["gap_m"].to_list() == pytest.approx([13.87, 13.87], abs=0.04)
     nearer = recipes.variations(CASE, {"gap_m": (0, 40)}, inside=4, edge=0, outside=2, boundary=0)
     assert nearer.filter(pl.col("id").str.starts_with("outside")).height == 1
+    ends = recipes.variations(gaps.row(0, named=True), {"gap_m": (8, 40)}, inside=0, edge=16, outside=0)
+    assert ends.select("id", "gap_m").rows() == [("edge-1", 8.0), ("edge-2", 40.0)]
 
 
 def test_a_case_that_is_none_is_named() -> None:
@@ -194,6 +202,13 @@ def test_a_justification_has_the_scores_and_intervals_of_the_study(study: tuple[
         assert found.hidden.height == of["fn"] and not found.hidden[f"{criterion}_parameterized"].any()
 
 
+def test_the_lanes_of_few_failing_scenarios_give_a_ratio_its_interval() -> None:
+    lanes = {"id": [1, 1, 2, 2] * 2, "headway": ["1s", "2s"] * 4, "variant": ["S"] * 4 + ["i"] * 4, "model": "FSM", "collision": True}
+    found = recipes.justification(pl.DataFrame({**lanes, "impact_speed_mps": 1.0, "min_ttc_s": 0.0}), "i", model="FSM")
+    value, low, high = found.scores.filter(quantity="S'/S").select("value", "low", "high").row(0)
+    assert low < value == 1.0 < high
+
+
 def test_the_rows_may_be_csv(study: tuple[pl.DataFrame, pl.DataFrame], tmp_path: Path) -> None:
     lanes = study[0].with_columns(pl.col("collision", "ttc", "btn").cast(pl.Int64))
     lanes.write_csv(tmp_path / "lanes.csv")
@@ -207,7 +222,7 @@ def test_limits_are_the_users_and_an_interval_over_a_limit_is_undecided(study: t
     assert dict(found.select("quantity", "within").iter_rows()) == {
         "recall": "yes", "precision": "undecided", "F1": "no", "S'/S": None,
     }  # fmt: skip
-    with pytest.raises(ValueError, match="there is no f1; there are recall"):
+    with pytest.raises(ValueError, match="there is no quantity `f1`; there are recall"):
         recipes.justification(study[0], "i", model="Reg157", limits={"f1": (0.9, 1)})
     with pytest.raises(ValueError, match="no parameterization"):
         recipes.justification(study[0], "1", model="Reg157")
@@ -221,11 +236,13 @@ def sampled(density: Path, tmp_path_factory: pytest.TempPathFactory) -> pl.DataF
     return pl.read_parquet(rows)
 
 
-def test_risk_has_the_estimates_of_every_density(density: Path) -> None:
+def test_risk_has_the_estimates_of_every_density(density: Path, tmp_path: Path) -> None:
     found = recipes.risk({"one": density, "other": density}, samples=500, models="FSM", thw=0.6)
     assert found["name"].unique(maintain_order=True).to_list() == ["one", "other"]
     fitted = lanesweep.fit(synth_recordings=2, categories="lvd", parameterizations=["i", "ii"])
-    assert set(recipes.risk(fitted, samples=100, models="FSM", thw=0.6)["name"]) == {"lvd-i", "lvd-ii"}
+    found_of_fit = recipes.risk(fitted, samples=100, models="FSM", thw=0.6, rows=tmp_path / "rows.parquet")
+    assert set(found_of_fit["name"]) == {"lvd-i", "lvd-ii"}
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["rows-lvd-i.parquet", "rows-lvd-ii.parquet"]
     own = pl.DataFrame(lanesweep.sample(density, samples=500, models="FSM", thw=0.6).table("estimates"))
     for name in ("probability", "replayed_ratio", "sampled_ratio_low", "sampled_ratio_high"):
         assert found.filter(name="one")[name].to_list() == found.filter(name="other")[name].to_list() == own[name].to_list()
@@ -243,6 +260,57 @@ def test_the_ratio_of_two_drivers_is_that_of_their_counts(sampled: pl.DataFrame)
         recipes.failure_ratio(fsm, cchdm.head(10))
     with pytest.raises(ValueError, match="filter its rows by model"):
         recipes.failure_ratio(fsm, sampled)
+    with pytest.raises(lanesweep.InputError, match="other cases"):
+        recipes.failure_ratio(fsm, cchdm.with_columns(pl.col("v_ego_mps") + 1))
+
+
+def test_rows_in_json_have_the_numbers_of_parquet(density: Path, sampled: pl.DataFrame, scenarios: Path, tmp_path: Path) -> None:
+    lanesweep.sample(density, samples=2000, models=["CCHDM", "FSM"], thw=[0.6, 1.2], rows=tmp_path / "rows.jsonl")
+    for criterion in ("collision", "ttc", "btn"):
+        ours, theirs = (recipes.worst(rows, 50, criterion=criterion).select("model", "sample").rows() for rows in (tmp_path / "rows.jsonl", sampled))
+        assert ours == theirs
+    ours, theirs = (recipes.failure_map(rows, "min_ttc_s", "max_btn", bins=3)["lanes"] for rows in (tmp_path / "rows.jsonl", sampled))
+    assert ours.to_list() == theirs.to_list() and sampled["min_ttc_s"].is_infinite().any()
+    lanesweep.mine(scenarios.parent / "recordings", out=tmp_path / "scenarios.parquet")
+    cut_ins = [_shared.table(file).filter(category="cut_in") for file in (scenarios, tmp_path / "scenarios.parquet")]
+    assert np.array_equal(*(recipes.fit_description(of, 2).mean for of in cut_ins))
+
+
+def _rows(**columns: Any) -> pl.DataFrame:
+    lanes = {"id": [1, 2], "headway": "1s", "model": "FSM", "collision": [True, False], "min_ttc_s": [0.0, 2.0], "x": [1.0, 2.0]}
+    more = {"impact_closing_speed_mps": [1.0, None], "contact_type": 2, "min_gap_m": 0.0, "category": ["lvd", "cut_in"], "target_v": [[1.0]] * 2}
+    return pl.DataFrame({**lanes, **more, "variant": "S", "fps": 25.0, **columns})
+
+
+WRONG = [
+    (lambda: recipes.variations(CASE, {"gapp_m": (1, 2)}), "no quantity of a case `gapp`; there are category.*\n.*`gap`"),
+    (lambda: recipes.variations(CASE | {"headway_s": 1}, {"gap_m": (1, 2)}), "no quantity of a case `headway`"),
+    (lambda: recipes.uncertain(CASE | {"deceleration_mps2": 3}, {"deceleration_mps2": 1}), "`deceleration`.*\n.*`acceleration`"),
+    (lambda: recipes.variations(CASE, {}), "nothing varies"),
+    (lambda: recipes.variations(CASE, {"gap_m": (1, 2)}, inside=-1), "`inside` is -1"),
+    (lambda: recipes.compare_results(_rows(), _rows().head(0)), "no rows"),
+    (lambda: recipes.compare_results(_rows(), _rows(), tolerances={"reaction": 1}), "`reaction`.*\n.*`reaction_s`"),
+    (lambda: recipes.largest_gap({"x": [1]}, {"x": (0, 2)}, draws={"x": []}), "no rows"),
+    (lambda: recipes.largest_gap({"x": [1]}, {"x": (2, 0)}), "x goes from 2 to 0"),
+    (lambda: recipes.failure_map(_rows(), "x", "x", bins=0), "`bins` is 0"),
+    (lambda: recipes.failure_map(_rows(), "x", "y"), "no column `y`; there are id"),
+    (lambda: recipes.risk({}), "`densities` has none"),
+    (lambda: recipes.fit_description(_rows(), 2), "give those of one category"),
+    (lambda: recipes.fit_description(_rows(category="cut-in"), 2), "no category `cut-in`.*\\n.*`cut_in`"),
+    (lambda: recipes.found_emphasis(_rows(), 2, criterion="tttc"), "no criterion `tttc`.*\n.*`ttc`"),
+    (lambda: recipes.worst(_rows(), criterion="collison"), "no criterion `collison`.*\n.*`collision`"),
+    (lambda: recipes.injury_risk(9.0, "nhtsa"), "no curve `nhtsa`; there are nhtsa-2022"),
+    (lambda: recipes.delta_v(_rows(), ego_kg=-1), "`ego_kg` is -1"),
+    (lambda: recipes.justification(_rows(), "i", model="FSM", level=95), "`level` is 95"),
+    (lambda: recipes.failure_ratio(_rows(id=1), _rows(), by="id"), "filter its rows by model, and by variant"),
+    (lambda: recipes.worst("rows.txt"), "no reader of rows.txt: `.txt`; there are .csv, .jsonl, .parquet"),
+]
+
+
+@pytest.mark.parametrize(("call", "message"), WRONG)
+def test_a_wrong_argument_is_named(call: Callable[[], Any], message: str) -> None:
+    with pytest.raises((lanesweep.UsageError, lanesweep.InputError), match=message):
+        call()
 
 
 def test_a_map_counts_every_lane_once(sampled: pl.DataFrame) -> None:
@@ -252,6 +320,9 @@ def test_a_map_counts_every_lane_once(sampled: pl.DataFrame) -> None:
     cell = found.sort("lanes").row(-1, named=True)
     inside = [pl.col(name).is_between(cell[f"{name}_low"], cell[f"{name}_high"], closed="left") for name in ("v_target_mps", "v_ego_mps")]
     assert sampled.filter(*inside, model=cell["model"]).height == cell["lanes"]
+    holes = sampled.with_columns(v_ego_mps=pl.when(pl.col("sample") > 2).then("v_ego_mps"))
+    some = recipes.failure_map(holes, "v_target_mps", "v_ego_mps", bins=10)
+    assert some["lanes"].sum() == holes["v_ego_mps"].count() < sampled.height and some["v_ego_mps_low"].is_finite().all()
 
 
 def test_the_worst_lanes_have_the_fastest_contacts(sampled: pl.DataFrame) -> None:
@@ -292,6 +363,8 @@ def test_momentum_divides_the_closing_speed_and_curves_have_the_numbers_of_their
 def test_the_largest_gap_is_between_neighbours_or_to_an_end(density: Path) -> None:
     found = recipes.largest_gap({"a": [1, 2, 4, 9.0], "b": [0.0, 4.0, 5, 10]}, {"a": (0, 10), "b": (5, 8)})
     assert found.rows() == [("b", 5.0, 8.0, 1.0), ("a", 4.0, 9.0, 0.5)]
+    equal = recipes.largest_gap({"a": [15, 20, 30]}, {"a": (10, 40)}, draws={"a": [25, 31, 35]})
+    assert equal.select("from", "to", "exposure").rows() == [(30.0, 40.0, pytest.approx(2 / 3))]
     limit_state = lanesweep.LimitState(density, model="FSM", thw=1.0)
     draws = dict(zip(limit_state.parameters, limit_state.draw(1000, 1).T, strict=True))
     (likely,) = recipes.largest_gap({"v_ego_mps": [10.0, 60.0]}, {"v_ego_mps": (10, 60)}, draws=draws).to_dicts()
@@ -352,6 +425,20 @@ def test_random_values_are_drawn_within_their_ranges(tmp_path: Path) -> None:
     assert [(found["poisson"] == k).mean() for k in range(3)] == pytest.approx(expected, abs=0.018)
     assert (found["set"] == 0.5).mean() == pytest.approx(0.75, abs=0.016)
     assert (found["bins"] < 1).mean() == pytest.approx(0.25, abs=0.016) and found["bins"].is_between(1, 2).sum() == 0
+
+
+def test_draws_of_a_tail_lie_in_their_range_and_no_draw_is_an_error(tmp_path: Path) -> None:
+    def drawn(variance: float, low: float, high: float, more: str = "") -> pl.Series:
+        of = f"<NormalDistribution expectedValue='100' variance='{variance}'><Range lowerLimit='{low}' upperLimit='{high}'/></NormalDistribution>"
+        one = f"<Stochastic numberOfTestRuns='500'><StochasticDistribution parameterName='a'>{of}</StochasticDistribution></Stochastic>"
+        (tmp_path / "a.xosc").write_text(XOSC.format(one + more))
+        return recipes.logical_scenario(tmp_path / "a.xosc")["a"]
+
+    assert drawn(225, 250, 300).is_between(250, 300).all() and drawn(225, -100, -50).is_between(-100, -50).all()
+    wrong = {"nothing can be drawn": (0, 60, 130), "goes from 130.0 to 60.0": (225, 130, 60), "either": (225, 60, 130, "<Deterministic/>")}
+    for message, values in wrong.items():
+        with pytest.raises(lanesweep.InputError, match=message):
+            drawn(*values)
 
 
 def test_a_description_without_emphasis_is_the_decomposition_of_the_study(scenarios: Path, tmp_path: Path) -> None:

@@ -279,9 +279,12 @@ def test_a_file_that_is_no_floating_car_data_says_what_is_missing(tmp_path) -> N
         path.write_text(one_vehicle(tmp_path).read_text().replace(f" {attribute}=", f" no-{attribute}="))
         with pytest.raises(lanesweep.InputError, match=f"vehicle a, time 0.5: there is no `{ours}`"):
             sumo(path, types)
-    path.write_text(one_vehicle(tmp_path).read_text().replace('speed="20"', 'speed="fast"'))
-    with pytest.raises(lanesweep.InputError, match=r"vehicle_id a, time_s 0.5: `speed_mps` is 'fast'; expected a number"):
-        sumo(path, types)
+    for speed in ("fast", "nan", "inf"):
+        path.write_text(one_vehicle(tmp_path).read_text().replace('speed="20"', f'speed="{speed}"'))
+        with pytest.raises(lanesweep.InputError, match=rf"vehicle_id a, time_s 0.5: `speed_mps` is '?{speed}'?; expected a number"):
+            sumo(path, types)
+    with pytest.raises(lanesweep.InputError, match=r"`length_m` is -4.0; expected a size"):
+        sumo(one_vehicle(tmp_path), types_of(tmp_path, '<vType id="T" length="-4"/>'))
 
 
 def test_a_truncated_file_is_an_error(simulated, tmp_path) -> None:
@@ -303,6 +306,14 @@ def test_a_truncated_file_is_an_error(simulated, tmp_path) -> None:
             sumo(tmp_path / name, types)
     with pytest.raises(FileNotFoundError):
         sumo(tmp_path / "none.xml", types)
+
+
+@pytest.mark.parametrize("read", [automatum, i24, lambda path: lists(path, {"zz": "time_s"})])
+@pytest.mark.parametrize("content", ['{"obj": []}', '{"objects": {"UUIDs": []}}', '[{"UUIDs": "a", "time": [0.0]}]'])
+def test_json_of_another_format_says_which_column_is_not_there(read, content, tmp_path) -> None:
+    (tmp_path / "other.json").write_text(content)
+    with pytest.raises(lanesweep.InputError, match=r"other.json: column `(UUID|_id|zz)`: not there; the file has obj|UUIDs"):
+        read(tmp_path / "other.json")
 
 
 AUTOMATUM = {"time": "time_s", "x_vec": "x_m", "y_vec": "y_m", "vx_vec": "vx_mps", "vy_vec": "vy_mps", "lane_id_vec": "lane"}
@@ -336,7 +347,7 @@ def test_i24_is_in_metres_at_the_middle_of_the_box_and_smoothed_by_its_preset(tr
         rear = [(x - way * length / 2) / FOOT_M for x in one["x_m"]]
         lists_of = {"timestamp": [1.6e9 + t for t in one["time_s"]], "x_position": rear, "y_position": [y / FOOT_M for y in one["y_m"]]}
         single = {"_id": {"$oid": one["vehicle_id"][0]}, "length": length / FOOT_M, "width": one["width_m"][0] / FOOT_M}
-        vehicles.append(lists_of | single | {"direction": int(way), "coarse_vehicle_class": 4 if lorry else 0})
+        vehicles.append(lists_of | single | {"direction": int(way), "coarse_vehicle_class": 4.0 if lorry else 0})
     (tmp_path / "day.json").write_text(json.dumps(vehicles))
     table = i24(tmp_path / "day.json")
     kind = pl.when(pl.col("class") == "car").then(pl.lit("sedan")).otherwise(pl.lit("semi"))
@@ -350,10 +361,12 @@ def test_i24_is_in_metres_at_the_middle_of_the_box_and_smoothed_by_its_preset(tr
     shutil.copy(tmp_path / "day.i24.parquet", tmp_path / "other.parquet")
     found = facts(mined(tmp_path / "day.i24.parquet"))
     assert len(found) > 10 and found == facts(mined(tmp_path / "other.parquet", preset="i24"))
-    vehicles[0]["direction"] = 0
-    (tmp_path / "day.json").write_text(json.dumps(vehicles))
-    with pytest.raises(lanesweep.InputError, match="`direction`"):
-        i24(tmp_path / "day.json")
+    assert i24(tmp_path / "lines.json")["class"].n_unique() == 2
+    for direction in (0, None):
+        vehicles[0]["direction"] = direction
+        (tmp_path / "day.json").write_text(json.dumps(vehicles))
+        with pytest.raises(lanesweep.InputError, match="`direction`"):
+            i24(tmp_path / "day.json")
 
 
 def test_swiftraj_keeps_its_positions_along_the_road(traffic, tmp_path) -> None:
@@ -378,6 +391,9 @@ def test_swiftraj_keeps_its_positions_along_the_road(traffic, tmp_path) -> None:
     converted = pl.read_parquet(tmp_path / "converted.parquet").filter(pl.col("vx") > 0)
     assert converted["x"].to_list() == frame.filter(pl.col("direction") > 0)["s_m"].to_list()
     assert len(mined(tmp_path / "along.parquet")) > 10
+    for interval_s in (0, -0.1, math.nan, None):
+        with pytest.raises(lanesweep.InputError, match=f"`frame_interval_s`: {interval_s} is not a number above 0"):
+            swiftraj(tmp_path / "sw.parquet", interval_s)
 
 
 def test_lists_of_other_names_are_read_and_must_be_equally_long(tmp_path) -> None:
@@ -401,6 +417,13 @@ def test_lists_of_other_names_are_read_and_must_be_equally_long(tmp_path) -> Non
     (tmp_path / "own.json").write_text(json.dumps([{**one, "x": ["far"] * len(one["x"])} for one in vehicles.to_dicts()]))
     with pytest.raises(lanesweep.InputError, match=r"vehicle_id a, time_s 0.0: `x_m` is 'far'; expected a number"):
         lists(tmp_path / "own.json", columns)
+    with pytest.raises(lanesweep.InputError, match="`x`: it is no column of tracks; there are vehicle_id"):
+        lists(tmp_path / "own.json", {"x": "x"})
+    fixed = vehicles.head(1).with_columns(pl.col("t", "x", "y").list.to_array(2))
+    fixed.write_parquet(tmp_path / "own.parquet")
+    assert_frame_equal(lists(tmp_path / "own.parquet", columns), expected.head(2))
+    fixed.with_columns(size=pl.lit(math.nan)).write_parquet(tmp_path / "own.parquet")
+    assert lists(tmp_path / "own.parquet", columns)["length_m"].to_list() == [None, None]
     (tmp_path / "own.json").write_text("[]")
     with pytest.raises(lanesweep.InputError, match="no vehicle"):
         lists(tmp_path / "own.json", {})

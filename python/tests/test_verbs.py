@@ -170,6 +170,20 @@ def test_a_row_of_a_frame_is_a_case_of_check_and_trace() -> None:
         assert lanesweep.check(frame.drop("length"), row=2).status == "preventable"
 
 
+def test_an_error_names_the_argument_and_no_file_that_nobody_made(caplog) -> None:
+    case = {"category": "cut-in", "ego_speed": "60km/h", "speed": "40km/h", "gap": -3, "lateral_speed": 1, "site": "a"}
+    frame = pl.DataFrame([case, case])
+    wrong = [lambda: lanesweep.check(case), lambda: lanesweep.trace(table=frame, row=2), lambda: lanesweep.check(frame.row(0))]
+    wrong += [lambda: lanesweep.study(frame), lambda: lanesweep.tracks(frame.to_pandas()), lambda: lanesweep.simulate({}), lambda: lanesweep.simulate("a.csv")]
+    says = ["`file`, column `gap`", "`table`, column `gap`, row 2", "`file` is", "`recordings` is a table in", "`paths` is a table in", "`cases` is", "`cases` is"]
+    for call, says_of_call in zip(wrong, says, strict=True):
+        with pytest.raises((lanesweep.InputError, lanesweep.UsageError), match=f"^{says_of_call}") as raised:
+            call()
+        assert "lanesweep-" not in str(raised.value)
+    assert lanesweep.check(next(pd.DataFrame([case | {"gap": 15}]).itertuples(index=False))).status == "preventable"
+    assert "`file`: these columns are not used: site" in caplog.text and "lanesweep-" not in caplog.text
+
+
 def test_a_figure_is_saved_as_what_its_name_says(scenarios, tmp_path) -> None:
     pytest.importorskip("matplotlib")
     figure = lanesweep.study(scenarios=scenarios, thw="1.2,0.6", backend="cpu").figure("f1-cut-in")

@@ -164,13 +164,14 @@ def case() -> str:
     types = {name: "Category" if name == "category" else "Speed" if "speed" in name and name != "lateral_speed" else "Number" for name in CASE}
     units = {name: f" ({known[name]['value']})" if types[name] == "Number" else "" for name in CASE}
     keys = "".join(f'    {name}: {types[name]}\n    """{sentence(known[name]["help"] + units[name])}"""\n' for name in CASE)
+    keys += "".join(f'    {name}_kmh: Float\n' for name in CASE if types[name] == "Speed") + "    duration: Number\n"
     return f'\n\nclass Case(TypedDict, total=False):\n    """One case, as a mapping. A table of cases has these names as columns."""\n\n{keys}'
 
 
 def module() -> str:
     """The source of `_verbs.py`."""
     made = [written(function) for function in FUNCTIONS]
-    types = sorted(set().union({"Category", "Number", "Speed"}, *(types for _, types in made)) - {"Any", "Case", "Literal", "Mapping", "None"})
+    types = sorted(set().union({"Category", "Float", "Number", "Speed"}, *(types for _, types in made)) - {"Any", "Case", "Literal", "Mapping", "None"})
     names = "".join(f'\n    "{name}",' for name in sorted(["Case", *FUNCTIONS]))
     head = HEAD.format(types="(" + "".join(f"\n    {one}," for one in types) + "\n)", names=names + "\n")
     return head + case() + "".join(text for text, _ in made)

@@ -1,7 +1,12 @@
-"""Recipes: what twenty lines compute from lanesweep's tables, short enough to be read and changed.
+"""Recipes: functions of at most forty lines on lanesweep's tables, to be read and changed.
 
 They need the extra: ``pip install 'lanesweep[recipes]'``.
 """
+
+from importlib.util import find_spec
+
+if find_spec("polars") is None:
+    raise ImportError("polars is missing: pip install 'lanesweep[recipes]'", name="polars")
 
 from ._justification import Justification, justification
 from ._lanes import INJURY_CURVES, InjuryCurve, delta_v, failure_map, injury_risk, largest_gap, worst

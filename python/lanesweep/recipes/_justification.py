@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import polars as pl
 
+from ..options import Criterion
 from . import _clusters
-from ._shared import extra, table
-
-if TYPE_CHECKING:
-    import polars as pl
+from ._shared import InputError, check_names, table, within
 
 
 class Justification(NamedTuple):
@@ -35,7 +34,7 @@ def justification(
     parameterization: str,
     *,
     model: str,
-    criterion: str = "collision",
+    criterion: Criterion = "collision",
     limits: Mapping[str, tuple[float, float]] | None = None,
     level: float = 0.95,
 ) -> Justification:
@@ -44,22 +43,20 @@ def justification(
     Of a decomposition the variant `KEY-cv` is scored, whose basis has not seen the scenarios. `limits` are yours, by the
     quantity: ``{"recall": (0.9, 1.0), "S'/S": (0.8, 1.25)}``. No standard sets them.
     """
-    with extra():
-        import polars as pl
-    rows = table(lanes).filter(model=model)
+    within(0.5, 0.9999, level=level)
+    rows = table(lanes, "id", "variant", "headway", "model", criterion).filter(model=model)
     known = rows["variant"].cast(pl.String)
     variant = f"{parameterization}-cv" if (known == f"{parameterization}-cv").any() else parameterization
     recorded, replayed = rows.filter(known == "S"), rows.filter(known == variant)
     both = recorded.join(replayed, on=["id", "headway"], suffix="_parameterized", validate="1:1", nulls_equal=True)
     if both.is_empty():
-        raise ValueError(f"the rows have no parameterization {variant} of {model}")
+        raise InputError(f"the rows have no parameterization {variant} of {model}")
     one, other = pl.col(criterion), pl.col(f"{criterion}_parameterized")
-    sums = {"tp": one & other, "fn": one & ~other, "fp": ~one & other, "runs": pl.lit(value=True)}
-    counts = both.group_by("id", maintain_order=True).agg(**{name: of.sum() for name, of in sums.items()})
+    sums = {"tp": (one & other).sum(), "fn": (one & ~other).sum(), "fp": (~one & other).sum(), "runs": pl.len()}
+    counts = both.group_by("id", maintain_order=True).agg(**sums)
     tp, fn, fp, runs = (counts[name].cast(pl.Int64).to_numpy() for name in sums)
     scores = _scores(tp, fn, fp, runs, level)
-    if unknown := set(limits or {}) - set(scores):
-        raise ValueError(f"there is no {', '.join(unknown)}; there are {', '.join(scores)}")
+    check_names(limits or (), scores, "quantity")
     inside = {name: _within(scores[name], ends) for name, ends in (limits or {}).items()}
     rows_of = [(name, variant, *value, inside.get(name)) for name, value in scores.items()]
     schema = {"quantity": pl.String, "variant": pl.String, "value": pl.Float64, "low": pl.Float64, "high": pl.Float64, "within": pl.String}

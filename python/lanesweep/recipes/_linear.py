@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+import polars as pl
 
 from .. import _verbs
 from ..options import Criterion
-from ._shared import extra, quiet, table
+from ._shared import InputError, check_names, extra, quiet, table
 
-if TYPE_CHECKING:
-    import polars as pl
 
 Array = npt.NDArray[np.float64]
 INSTANTS, KNOTS = 50, 4
@@ -36,13 +35,13 @@ class Description(NamedTuple):
 
 def fit_description(scenarios: Any, size: int, emphasis: npt.ArrayLike | None = None) -> Description:
     """Decompose scenarios of one category (singular values) with weights times exp(emphasis): 4 knots per series, one per number."""
-    rows = table(scenarios)
+    rows = table(scenarios, "category", "target_v", "fps")
     return _fit(_vectors(rows), _category(rows), size, emphasis)
 
 
 def replayed(description: Description, scenarios: Any) -> pl.DataFrame:
     """Return scenarios as the description keeps them: an S' for `study(external=…)`."""
-    rows = table(scenarios)
+    rows = table(scenarios, "category", "target_v", "fps")
     return _scenarios(rows, _decoded(description, _vectors(rows)))
 
 
@@ -56,7 +55,8 @@ def found_emphasis(
     """
     with extra():
         import cma
-    rows = table(scenarios)
+    check_names([criterion], ["collision", "ttc", "btn"], "criterion")
+    rows = table(scenarios, "category", "target_v", "fps")
     z, category = _vectors(rows), _category(rows)
     series, numbers = _LAYOUT[category]
     data: Any = rows
@@ -103,14 +103,15 @@ def _decoded(description: Description, z: Array) -> Array:
 
 
 def _category(rows: pl.DataFrame) -> str:
-    (found,) = rows["category"].unique()
-    return str(found)
+    found = rows["category"].unique().to_list()
+    check_names(found, _LAYOUT, "category")
+    if len(found) != 1:
+        raise InputError(f"there are scenarios of {', '.join(map(str, found))}\n  help: give those of one category")
+    return str(found[0])
 
 
 def _scenarios(rows: pl.DataFrame, z: Array) -> pl.DataFrame:
     """The scenarios of vectors, with sizes and sides of the rows."""
-    import polars as pl
-
     category = _category(rows)
     series, numbers = _LAYOUT[category]
     found = {name: z[:, INSTANTS * at : INSTANTS * (at + 1)] for at, name in enumerate(series)}
@@ -129,13 +130,13 @@ def _scenarios(rows: pl.DataFrame, z: Array) -> pl.DataFrame:
 
 def _scores(rows: pl.DataFrame, described: Mapping[str, pl.DataFrame], criterion: Criterion) -> list[float]:
     """Mean F1 of every S' over the drivers for which S fails in ten scenarios."""
-    import polars as pl
-
     data: Any = rows
     # A bad proposal jumps sideways, and is scored all the same.
     with quiet():
         study = _verbs.study(scenarios=data, external=described, accept_implausible=True, config={"study": {"folds": 1}})
     judged = table(study.table("results")).filter((pl.col("criterion") == criterion) & (pl.col("failing_scenarios") >= 10))
+    if judged.is_empty():
+        raise InputError(f"no driver fails in ten of these scenarios ({criterion})\n  help: give more scenarios, or another criterion")
     means = judged.group_by("variant").agg(pl.col("f1").fill_null(0.0).mean())
     by_name = dict(means.iter_rows())
     return [float(by_name[name]) for name in described]

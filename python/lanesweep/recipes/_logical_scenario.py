@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import functools
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 import numpy as np
+import polars as pl
 
 from ..options import Path
-from ._shared import extra
-
-if TYPE_CHECKING:
-    import polars as pl
+from ._shared import InputError, extra
 
 
 def logical_scenario(file: Path, *, draws: int | None = None, seed: int | None = None) -> pl.DataFrame:
@@ -22,14 +20,12 @@ def logical_scenario(file: Path, *, draws: int | None = None, seed: int | None =
     Columns have the names and units of the file. `draws` and `seed` are by default its `numberOfTestRuns` and `randomSeed`.
     Distributions are truncated to their ranges. Expressions and parameter references are refused.
     """
-    with extra():
-        import polars as pl
     root = ElementTree.parse(file).getroot()
     listed, random = root.find("*/Deterministic"), root.find("*/Stochastic")
-    if listed is not None:
+    if listed is not None and random is None:
         return functools.reduce(lambda one, other: one.join(other, how="cross"), map(_values, listed))
-    if random is None:
-        raise ValueError(f"{file}: no ParameterValueDistribution with values")
+    if random is None or listed is not None:
+        raise InputError(f"{file}: expected a ParameterValueDistribution with either Deterministic or Stochastic values")
     # A seed is a double. The hash of a whole one is itself.
     own = abs(hash(float(random.get("randomSeed", 0.0))))
     generator = np.random.default_rng(own if seed is None else seed)
@@ -39,8 +35,6 @@ def logical_scenario(file: Path, *, draws: int | None = None, seed: int | None =
 
 def _values(distribution: Element) -> pl.DataFrame:
     """The values of one parameter, or the sets of several."""
-    import polars as pl
-
     if distribution.tag == "DeterministicMultiParameterDistribution":
         sets = [{one.attrib["parameterRef"]: _value(one) for one in each} for each in distribution.iter("ParameterValueSet")]
         return pl.DataFrame(sets, infer_schema_length=None)
@@ -56,7 +50,7 @@ def _value(one: Element) -> float | str:
     """A number, or the text of another value."""
     text = one.attrib["value"]
     if text.startswith("$"):
-        raise ValueError(f"{text}: references and expressions are not evaluated")
+        raise InputError(f"{text}: references and expressions are not evaluated")
     try:
         return float(text)
     except ValueError:
@@ -65,7 +59,10 @@ def _value(one: Element) -> float | str:
 
 def _range(one: Element) -> tuple[float, float]:
     found = one.find("Range")
-    return (-np.inf, np.inf) if found is None else (float(found.attrib["lowerLimit"]), float(found.attrib["upperLimit"]))
+    low, high = (-np.inf, np.inf) if found is None else (float(found.attrib["lowerLimit"]), float(found.attrib["upperLimit"]))
+    if not low <= high:
+        raise InputError(f"{one.tag}: its range goes from {low} to {high}")
+    return low, high
 
 
 def _draws(distribution: Element, count: int, generator: np.random.Generator) -> Any:
@@ -90,5 +87,10 @@ def _draws(distribution: Element, count: int, generator: np.random.Generator) ->
         of, low = stats.poisson(mean), np.ceil(low) - 1
     else:
         # The moments of a LogNormalDistribution may be those of the value or of its logarithm.
-        raise ValueError(f"{kind} has no meaning here: draw it yourself, with NumPy")
-    return of.ppf(of.cdf(low) + u * (of.cdf(high) - of.cdf(low)))
+        raise InputError(f"{kind} has no meaning here: draw it yourself, with NumPy")
+    # In the tail that has the range, whose probabilities have all their digits.
+    share, value = (of.sf, of.isf) if low > mean else (of.cdf, of.ppf)
+    found = value(share(low) + u * (share(high) - share(low)))
+    if not np.isfinite(found).all():
+        raise InputError(f"{kind}: nothing can be drawn from {low} to {high} with {distribution.attrib}")
+    return found

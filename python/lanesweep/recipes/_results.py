@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
+
+import polars as pl
 
 from .. import _verbs
-from .._result import temporary
 from .._simulate import simulate
 from ..options import Path as PathLike
-from ._shared import extra, table
+from ._shared import InputError, check_names, extra, table
 
-if TYPE_CHECKING:
-    import polars as pl
 
 #: Quantities of `compare_results`, a cause before its effects, with the differences that count as none: half of a time step of
 #: 0.1 s, 0.1 m and 0.2 m/s.
@@ -40,7 +38,7 @@ class Comparison(NamedTuple):
     agreement : tuple of float
         Fraction of the results with the same answer to whether the vehicles touch, with its interval (95 %, Clopper and Pearson).
     missing : int
-        Number of the cases without a result.
+        Number of the cases without a result, or whose result has no `collision`.
     ignored : list of str
         Columns of the results that were not compared.
     """
@@ -63,16 +61,17 @@ def compare_results(
     """Compare another simulator's results with a driver's lanes: the first quantity that differs, in the cases that differ.
 
     `cases` is a table of cases with an `id`, `theirs` one with `id`, `collision` and, where known, quantities of `TOLERANCES`. A field
-    without a value is unknown. Infinite is a value: a time that never comes, a gap that never closes.
+    without a value is unknown. Infinite is a value: a time that never comes, a gap that never closes. A quantity that `tolerances` leaves
+    out is not compared.
     """
     with extra():
-        import polars as pl
         from statsmodels.stats.proportion import proportion_confint
-    given, own = table(theirs), table(cases)
+    check_names(tolerances, TOLERANCES, "quantity to compare")
+    given, own = table(theirs, "id", "collision"), table(cases, "id")
     results = _as_values(given)
     both = results.join(_lanes(own, results.columns, model, profile), on="id", suffix="_ours", validate="1:1")
     if both.height < results.height:
-        raise ValueError(f"{results.height - both.height} results have the id of no case")
+        raise InputError(f"{results.height - both.height} results have the id of no case")
     most = {name: by for name, by in tolerances.items() if name in results.columns} | {"collision": 0.0}
     pairs = {name: (pl.col(name), pl.col(f"{name}_ours")) for name in most}
     # Infinite minus infinite is no difference.
@@ -85,22 +84,18 @@ def compare_results(
     causes = {"quantity": [name for name, _ in of], "cases": [len(by) for _, by in of]}
     causes |= {what: [getattr(by, what)() for _, by in of] for what in ("median", "min", "max")}
     ordered = pl.DataFrame(causes).filter(pl.col("cases") > 0).sort("cases", descending=True, maintain_order=True)
-    agreeing = compared.filter(collision=0.0).height
-    low, high = proportion_confint(agreeing, compared.height, method="beta")
-    ignored = [name for name in given.columns if name not in results.columns]
-    return Comparison(compared, ordered, (agreeing / compared.height, low, high), own.height - both.height, ignored)
+    agreeing, judged = compared.filter(collision=0.0).height, compared["collision"].count()
+    low, high = proportion_confint(agreeing, judged, method="beta")
+    ignored = [name for name in given.columns if name not in ("id", *most)]
+    return Comparison(compared, ordered, (agreeing / judged, low, high), own.height - judged, ignored)
 
 
 def _lanes(cases: pl.DataFrame, columns: list[str], model: str, profile: PathLike) -> pl.DataFrame:
     """The driver's outcomes. An event that does not happen has an infinite time."""
-    import polars as pl
-
     found = table(simulate(cases, models=model, profile=profile))
     if "braking_s" in columns:
-        keep = temporary()
-        file = Path(keep.name) / "cases.parquet"
-        cases.drop("answer", strict=False).write_parquet(file)
-        traces = (_verbs.trace(table=file, row=row + 1, models=model, profile=profile).document for row in range(len(cases)))
+        rows: Any = cases.drop("answer", strict=False).iter_rows(named=True)
+        traces = (_verbs.trace(table=row, models=model, profile=profile).document for row in rows)
         braking = [next((step["t_s"] for step in of["steps"] if "braking" in (step["mark"] or "")), None) for of in traces]
         found = found.with_columns(braking_s=pl.Series(braking, dtype=pl.Float64))
     times = [name for name in ("reaction_s", "braking_s", "contact_s") if name in found.columns]
@@ -109,13 +104,11 @@ def _lanes(cases: pl.DataFrame, columns: list[str], model: str, profile: PathLik
 
 def _as_values(rows: pl.DataFrame) -> pl.DataFrame:
     """Numbers, and texts as ids. Vehicles that touch have no gap left, and others never touch."""
-    import polars as pl
-
     known = [name for name in TOLERANCES if name in rows.columns]
-    if absent := {"id", "collision"} - set(rows.columns):
-        raise ValueError(f"a table of results has a column {' and '.join(sorted(absent))}; there are {', '.join(rows.columns)}")
     if not rows["id"].is_unique().all():
-        raise ValueError(f"the id {rows.filter(pl.col('id').is_duplicated())['id'][0]} occurs twice")
+        raise InputError(f"the id {rows.filter(pl.col('id').is_duplicated())['id'][0]} occurs twice")
+    if not rows["collision"].count():
+        raise InputError("`collision` has no value in any row\n  help: say whether the vehicles touch")
     found = rows.select(pl.col("id").cast(pl.String), pl.col("collision", *known).cast(pl.Float64))
     if "min_gap_m" in known:
         found = found.with_columns(pl.col("min_gap_m").clip(lower_bound=0.0))

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import difflib
 import logging
 import os
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import polars as pl
+import polars.selectors as select
 
 from .. import _verbs
-from .._core import InputError
-from .._result import temporary
+from .._core import InputError as InputError, UsageError as UsageError
 from ..options import Path as PathLike
-
-if TYPE_CHECKING:
-    import polars as pl
 
 
 @contextmanager
@@ -39,39 +41,61 @@ def quiet() -> Iterator[None]:
         log.setLevel(level)
 
 
-def table(rows: Any) -> pl.DataFrame:
+def check_names(names: Iterable[str], known: Iterable[str], what: str) -> None:
+    """Refuse names that are none of the known ones; the error has the nearest of these."""
+    for name in names:
+        if name not in (all_known := [*known]):
+            help = "".join(f"\n  help: did you mean `{near}`?" for near in difflib.get_close_matches(str(name), all_known, 1))
+            raise UsageError(f"there is no {what} `{name}`; there are {', '.join(all_known)}{help}")
+
+
+def within(low: float, high: float, **given: float) -> None:
+    """Refuse arguments out of range."""
+    for name, value in given.items():
+        if not low <= value <= high:
+            raise UsageError(f"`{name}` is {value}; expected {low} to {high}")
+
+
+def table(rows: Any, *needs: str, may_be_empty: bool = False) -> pl.DataFrame:
     """Return a table of lanesweep, pandas, Polars or pyarrow, columns by their names, or a file (.csv, .jsonl, .parquet).
 
-    NaN is no value. Verdicts, which are 0 and 1 in CSV, become true and false.
+    It has the columns `needs`. NaN is no value. Verdicts, which are 0 and 1 in CSV, become true and false; nested fields and infinite
+    numbers, which are texts in JSON, are those of Parquet.
     """
-    with extra():
-        import polars as pl
-        import polars.selectors as select
     if isinstance(rows, (str, os.PathLike)):
         path = Path(rows)
-        if path.suffix == ".csv":
-            rows = pl.read_csv(path, infer_schema_length=None)
-        else:
-            rows = pl.read_parquet(path) if path.suffix == ".parquet" else pl.read_ndjson(path, infer_schema_length=None)
-    found = pl.DataFrame(dict(rows) if isinstance(rows, Mapping) else rows, strict=False)
+        readers = {".csv": partial(pl.read_csv, infer_schema_length=None), ".jsonl": partial(pl.read_ndjson, infer_schema_length=None)}
+        readers[".parquet"] = partial(pl.read_parquet)
+        check_names([path.suffix], readers, f"reader of {path}:")
+        rows = readers[path.suffix](path)
+    found = pl.DataFrame(dict(rows) if isinstance(rows, Mapping) else rows, strict=False).unnest(select.struct(), separator="_")
+    check_names(needs, found.columns, "column")
+    if found.is_empty() and not may_be_empty:
+        raise InputError("the table has no rows\n  help: give at least one")
+    infinite = [of.name for of in found.select(select.string()) if of.str.contains("^-?Infinity$").any()]
+    found = found.cast(dict.fromkeys(infinite, pl.Float64))
     verdicts = select.by_name("collision", "ttc", "btn", require_all=False) & select.integer()
     return found.with_columns(select.float().fill_nan(None), verdicts.cast(pl.Boolean))
 
 
+def case_of(case: Mapping[str, Any], varied: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a case without its id and answer; its names, and those of what varies, must be quantities of a case."""
+    given = {name: value for name, value in case.items() if name not in ("id", "answer")}
+    check_names((re.sub("_(kmh|mps2?|m|s)$", "", name) for name in [*given, *varied]), _verbs.Case.__annotations__, "quantity of a case")
+    if not varied:
+        raise UsageError("nothing varies\n  help: give at least one quantity")
+    return given
+
+
 def answers(cases: pl.DataFrame, profile: PathLike) -> pl.DataFrame:
     """Return the computed answer of every case, a column `verdict` and one per driver; no values where a row is no case."""
-    with extra():
-        import polars as pl
-    keep = temporary()
-    file, found = Path(keep.name) / "cases.parquet", Path(keep.name) / "answers.parquet"
-    cases.write_parquet(file)
     try:
         # A draw that is no case is counted, not reported.
         with quiet():
-            _verbs.check(file, nominal=True, profiles=profile, rows=found)
+            found = table(_verbs.check(cases, nominal=True, profiles=profile).table("cases"))
     except InputError:
         # No row is a case: say what is wrong with the first one.
-        _verbs.check(file, row=1, profiles=profile)
+        _verbs.check(cases, row=1, profiles=profile)
         raise
     every = pl.DataFrame({"row": range(1, len(cases) + 1)}, schema={"row": pl.Int64})
-    return every.join(pl.read_parquet(found), on="row", how="left", maintain_order="left").drop("row")
+    return every.join(found, on="row", how="left", maintain_order="left").drop("row")

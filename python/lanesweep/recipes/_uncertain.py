@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+import polars as pl
 
 from ..options import Path
-from ._shared import answers, extra
-
-if TYPE_CHECKING:
-    import polars as pl
+from ._shared import InputError, answers, case_of, extra, within
 
 
 class Uncertainty(NamedTuple):
@@ -25,7 +23,7 @@ class Uncertainty(NamedTuple):
     drivers : DataFrame
         Per driver, the draws in which it avoids the collision, of those in which an ego that never reacts collides.
     indices : DataFrame
-        Per input, the first-order index: the fraction of the variance of the answer that its error alone explains.
+        Per input, the first-order index, the fraction of the answer's variance that its error alone explains, ± `half_width` (95 %).
     draws : DataFrame
         Every draw with its answer; null where the numbers are no case.
     """
@@ -50,14 +48,15 @@ def uncertain(
     are of the model: they do not say whether your sensors have these errors.
     """
     with extra():
-        import polars as pl
         from scipy import stats
+    within(1, float("inf"), draws=draws)
+    case = case_of(case, errors)
     generator = np.random.default_rng(seed)
     known = {name: stats.norm(scale=error) if np.isscalar(error) else error for name, error in errors.items()}
     if absent := [name for name in known if name not in case]:
-        raise ValueError(f"{', '.join(absent)}: the case has no such column; it has {', '.join(case)}")
+        raise InputError(f"{', '.join(absent)}: the case has no such column; it has {', '.join(case)}")
     if texts := [name for name in known if isinstance(case[name], str)]:
-        raise ValueError(f"{', '.join(texts)}: what has an error is a number; write the unit into the name: ego_speed_kmh")
+        raise InputError(f"{', '.join(texts)}: what has an error is a number; write the unit into the name: ego_speed_kmh")
     drawn = {name: case[name] + error.rvs(draws, random_state=generator) for name, error in known.items()}
     cases = pl.DataFrame({**case, **drawn})
     found = answers(cases, profile)
@@ -66,7 +65,7 @@ def uncertain(
     counts = judged["verdict"].value_counts(sort=True)
     drivers: list[str] = [name for name in ("Reg157", "CCHDM", "RSS", "FSM") if name in found.columns]
     avoiding = [conflicts.filter(pl.col(name) != "COLLIDES").height for name in drivers]
-    own = answers(pl.DataFrame(dict(case)), profile)["verdict"][0]
+    own = answers(pl.DataFrame(case), profile)["verdict"][0]
     inputs = cases.select(list(drawn)).with_columns(is_own=found["verdict"] == own).drop_nulls()
     return Uncertainty(
         _shares("answer", counts["verdict"].to_list(), counts["count"].to_list(), judged.height),
@@ -78,7 +77,6 @@ def uncertain(
 
 def _shares(what: str, names: list[str], counts: list[int], of: int) -> pl.DataFrame:
     with extra():
-        import polars as pl
         from statsmodels.stats.proportion import proportion_confint
     if not of:
         names, counts, of = [], [], 1
@@ -93,8 +91,6 @@ def _indices(inputs: pl.DataFrame, seed: int) -> pl.DataFrame:
     There are a hundred bins, or fewer of ten draws each. The index is the correlation ratio, corrected for the number of bins (Kelley's
     epsilon squared); its interval comes from 200 bootstrap samples.
     """
-    with extra():
-        import polars as pl
     names, is_own = inputs.columns[:-1], inputs["is_own"].to_numpy().astype(np.float64)
     count = len(is_own)
     if min(is_own.sum(), count - is_own.sum()) < 30:

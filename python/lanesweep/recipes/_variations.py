@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import polars as pl
 
 from ..options import Path
-from ._shared import answers, extra
+from ._shared import answers, case_of, extra, within
 
-if TYPE_CHECKING:
-    import polars as pl
 
 Points = npt.NDArray[np.float64]
 #: Answers to points in units of the ranges, empty where a point is no case.
@@ -33,16 +32,16 @@ def variations(
     """Vary columns of a case in their ranges, by a scrambled Sobol sequence. A row has an `id` and the computed `answer`.
 
     Cases of `edge` have one quantity at an end of its range, those of `outside` one beyond an end by up to a quarter of the range,
-    the ends in turn. `boundary` is the number of pairs with different answers that lie a thousandth of the ranges apart at most.
-    Points that are no case have no row.
+    the ends in turn. `boundary` is the maximum number of pairs with different answers, a thousandth of the ranges apart at most.
+    Points that are no case, and repeated ends of a single range, have no row.
     """
-    with extra():
-        import polars as pl
+    within(0, float("inf"), inside=inside, edge=edge, outside=outside, boundary=boundary)
+    known = case_of(case, ranges)
     low, high = np.array(list(ranges.values()), dtype=np.float64).T
 
     def cases(places: Points) -> pl.DataFrame:
         values = (low + places * (high - low)).round(6)
-        return pl.DataFrame({**case, **dict(zip(ranges, values.T, strict=True))})
+        return pl.DataFrame({**known, **dict(zip(ranges, values.T, strict=True))})
 
     def answer(places: Points) -> npt.NDArray[np.str_]:
         return answers(cases(places), profile)["verdict"].fill_null("").to_numpy().astype(str)
@@ -53,7 +52,8 @@ def variations(
     names += [f"boundary-{k // 2 + 1}{'ab'[k % 2]}" for k in range(len(pairs))]
     places = np.vstack([places, pairs])
     found = cases(places).insert_column(0, pl.Series("id", names)).with_columns(answer=pl.Series(answer(places)))
-    return found.filter(pl.col("answer") != "")
+    repeated = [f"edge-{k + 1}" for k in range(2, edge) if len(ranges) == 1]
+    return found.filter(pl.col("answer") != "", ~pl.col("id").is_in(repeated))
 
 
 def _places(size: int, inside: int, edge: int, outside: int, seed: int) -> Points:

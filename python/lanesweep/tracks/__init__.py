@@ -10,8 +10,8 @@ line, of the middle of the box; ``heading_deg`` (from +x towards y), ``speed_mps
 begins with ``truck``, ``bus`` or the like), ``lane`` (its name), ``direction`` (1 along the road, -1 against it). Several recordings in
 one table need a column ``recording``. The log, ``lanesweep``, names what is left out.
 
-Texts may be compressed with gzip (``.gz``). A file that cannot be read raises `lanesweep.InputError`, a `ValueError`, that names
-file and element. They need the extra: ``pip install 'lanesweep[tracks]'``.
+Texts may be compressed with gzip (``.gz``). A missing file raises `FileNotFoundError`; one that cannot be used raises
+`lanesweep.InputError`, a `ValueError`, that names file and element. They need the extra: ``pip install 'lanesweep[tracks]'``.
 """
 
 from __future__ import annotations

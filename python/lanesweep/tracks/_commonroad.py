@@ -58,7 +58,7 @@ def commonroad(path: File) -> pl.DataFrame:
         elif one.tag == "lanelet":
             left, right = (one.findall(f"{side}Bound/point") for side in ("left", "right"))
             points = [[number(path, f"lanelet {name}", point.findtext(axis)) for axis in "xy"] for point in [*left, *right[::-1]]]
-            lanelets[name] = np.array(points)
+            lanelets[name] = np.array(points).reshape(-1, 2)
         elif kind in _OTHERS or (is_static and kind not in _STANDING):
             left_out.append(f"{name} ({kind})")
         else:
@@ -74,7 +74,8 @@ def commonroad(path: File) -> pl.DataFrame:
     times = dict.fromkeys(row[0] for row in rows)
     rows += [(time, *row[1:]) for row in standing for time in times]
     frame = canonical(path, pl.DataFrame(rows, dict.fromkeys([*_STATE, *_FACTS, "vehicle_id"], pl.String), orient="row"))
-    step_s = number(path, "`timeStepSize` of the root", root.get("timeStepSize"))
+    step_s = number(path, "`timeStepSize` of the root", root.get("timeStepSize"), above=0)
+    warn_left_out(path, frame.filter(pl.col("length_m").is_null())["vehicle_id"], "sizes, of other shapes than rectangles,")
     lane = _lanes(frame["x_m"].to_numpy()[:, None], frame["y_m"].to_numpy()[:, None], lanelets)
     turned = pl.col("heading_deg") * (180.0 / math.pi)
     return canonical(path, frame.with_columns(turned, time_s=pl.col("frame") * step_s, lane=pl.Series(lane, dtype=pl.String)))

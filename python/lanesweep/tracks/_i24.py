@@ -43,7 +43,7 @@ def i24(path: File) -> pl.DataFrame:
         if isinstance(vehicle.get("_id"), dict):
             vehicle["_id"] = vehicle["_id"].get("$oid")
     frame = canonical(path, json_lists(path, vehicles, _NAMES))
-    if not frame["direction"].is_in([1.0, -1.0]).all():
+    if not frame["direction"].is_in([1.0, -1.0]).fill_null(False).all():
         raise bad(path, "`direction`", "it is neither 1 nor -1", "check that this is I-24 MOTION")
-    frame = frame.with_columns(pl.col("s_m", "d_m", "length_m", "width_m") * _FOOT_M, pl.col("class").replace(_CLASSES))
+    frame = frame.with_columns(pl.col("s_m", "d_m", "length_m", "width_m") * _FOOT_M, pl.col("class").str.strip_suffix(".0").replace(_CLASSES))
     return frame.with_columns(s_m=pl.col("s_m") + pl.col("direction") * pl.col("length_m") * 0.5)

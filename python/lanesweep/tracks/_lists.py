@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import polars as pl
 
 from ..options import Path as File
-from ._table import canonical, json_lists, json_vehicles, read_table, unpacked
+from ._table import COLUMNS, bad, canonical, json_lists, json_vehicles, number, read_table, unpacked
 
 _SWIFTRAJ = {
     "vehicle_id": "vehicle_id",
@@ -41,6 +41,8 @@ def lists(path: File, columns: Mapping[str, str]) -> pl.DataFrame:
     polars.DataFrame
         These columns, a row per item of the lists; what is no list is repeated.
     """
+    if unknown := set(columns.values()) - set(COLUMNS):
+        raise bad(path, f"`{min(unknown)}`", f"it is no column of tracks; there are {', '.join(COLUMNS)}", "give one of these")
     if os.fspath(path).endswith(".parquet"):
         return canonical(path, unpacked(path, read_table(path), columns))
     return canonical(path, json_lists(path, json_vehicles(path), columns))
@@ -63,5 +65,5 @@ def swiftraj(path: File, frame_interval_s: float = 0.1) -> pl.DataFrame:
     polars.DataFrame
         ``vehicle_id, frame, time_s, s_m, d_m, forward_speed_mps, leftward_speed_mps, acceleration_mps2, length_m, width_m, class, lane``.
     """
-    frame = lists(path, _SWIFTRAJ)
-    return canonical(path, frame.with_columns(time_s=pl.col("frame") * frame_interval_s))
+    step_s, frame = number(path, "`frame_interval_s`", frame_interval_s, above=0), lists(path, _SWIFTRAJ)
+    return canonical(path, frame.with_columns(time_s=pl.col("frame") * step_s))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import json
 import logging
+import math
 import os
 import re
 import xml.etree.ElementTree as ET
@@ -35,12 +36,15 @@ def bad(path: File, place: str, problem: str, help: str) -> InputError:
     return InputError(f"{os.fspath(path)}: {place}: {problem}\n  help: {help}")
 
 
-def number(path: File, place: str, text: str | float | None) -> float:
-    """Return the number that a text is."""
+def number(path: File, place: str, text: str | float | None, *, above: float = -math.inf) -> float:
+    """Return the finite number that a text is."""
     try:
-        return float(text if text is not None else "")
+        value = float(text if text is not None else "")
     except ValueError:
-        raise bad(path, place, f"{text!r} is not a number", "correct the value") from None
+        value = math.nan
+    if not above < value < math.inf:
+        raise bad(path, place, f"{text!r} is not a number" + f" above {above}" * math.isfinite(above), "correct the value")
+    return value
 
 
 def warn_left_out(path: File, names: Iterable[Any], what: str) -> None:
@@ -108,12 +112,14 @@ def json_vehicles(path: File, key: str = "") -> list[dict[str, Any]]:
     return found
 
 
-def unpacked(path: File, vehicles: pl.DataFrame, columns: Mapping[str, str]) -> pl.DataFrame:
-    """A row per item of the lists of the vehicles; `columns` has our names by theirs."""
+def unpacked(path: File, vehicles: pl.DataFrame, columns: Mapping[str, str], there: Iterable[str] = ()) -> pl.DataFrame:
+    """A row per item of the lists of the vehicles; `columns` has our names by theirs, which are among those that are `there`."""
     for theirs in columns:
         if theirs not in vehicles.columns:
-            raise bad(path, f"column `{theirs}`", f"not there; the file has {', '.join(vehicles.columns)}", "check that it has this format")
+            problem = f"not there; the file has {', '.join(there or vehicles.columns)}"
+            raise bad(path, f"column `{theirs}`", problem, "check that it has this format")
     frame = vehicles.select(pl.col(theirs).alias(ours) for theirs, ours in columns.items())
+    frame = frame.with_columns(pl.col(name).arr.to_list() for name, dtype in frame.schema.items() if isinstance(dtype, pl.Array))
     packed = [name for name, dtype in frame.schema.items() if isinstance(dtype, pl.List)]
     if not packed:
         return frame
@@ -128,27 +134,30 @@ def unpacked(path: File, vehicles: pl.DataFrame, columns: Mapping[str, str]) -> 
 
 def json_lists(path: File, vehicles: list[dict[str, Any]], columns: Mapping[str, str]) -> pl.DataFrame:
     """The same of vehicles from JSON."""
-    frame = {}
-    for theirs in columns:
+    frame, there = {}, dict.fromkeys(key for vehicle in vehicles for key in vehicle)
+    for theirs in [of for of in columns if of in there or not vehicles]:
         cells = [vehicle.get(theirs) for vehicle in vehicles]
         packed = any(isinstance(cell, list) for cell in cells)
         for number, cell in enumerate(cells, 1):
             if packed != isinstance(cell, list):
                 raise bad(path, f"vehicle {number} of the list", f"`{theirs}` is {cell!r:.40}", "give every vehicle the same keys")
         frame[theirs] = pl.Series(theirs, cells, dtype=pl.List(pl.String) if packed else pl.String, strict=False)
-    return unpacked(path, pl.DataFrame(frame), columns)
+    return unpacked(path, pl.DataFrame(frame), columns, there)
 
 
 def canonical(path: File, frame: pl.DataFrame) -> pl.DataFrame:
-    """The columns in their order and with their types; a text that is no number is an error."""
+    """The columns in their order and with their types, NaN as no value; what else is no finite number, or no size, is an error."""
+    frame = frame.with_columns(pl.col(pl.Float32, pl.Float64).fill_nan(None))
     names = [name for name in COLUMNS if name in frame.columns]
     types = {name: pl.String if name in _TEXTS else pl.Int64 if name == "frame" else pl.Float64 for name in names}
     table = frame.select(pl.col(name).cast(dtype, strict=False) for name, dtype in types.items())
     for name in names:
-        wrong = frame.filter(table[name].is_null() & frame[name].is_not_null())
+        is_size, found = name in ("length_m", "width_m"), table[name]
+        is_good = found.is_finite() & (found > (0.0 if is_size else -math.inf)) if types[name] == pl.Float64 else found.is_not_null()
+        wrong = frame.filter(~is_good.fill_null(False) & frame[name].is_not_null())
         if len(wrong):
             place = ", ".join(f"{of} {wrong[of][0]}" for of in ("vehicle_id", "frame", "time_s") if of in wrong.columns)
-            raise bad(path, place, f"`{name}` is {wrong[name][0]!r}; expected a number", "correct the value")
+            raise bad(path, place, f"`{name}` is {wrong[name][0]!r}; expected a {'size' if is_size else 'number'}", "correct the value")
     if table.is_empty():
         raise bad(path, "the file", "there is no vehicle", "check that it has this format")
     return table
