@@ -1,5 +1,5 @@
-//! What a case sheet rests on: identity with hashes, assumptions, the effect of the time step, and what no sheet considers.
-//! Nothing is taken from the clock or the machine.
+//! What a case sheet rests on: identity with hashes, assumptions, the effect of the time step, the verdict by rule, and what no
+//! sheet considers. Nothing is taken from the clock or the machine.
 
 use serde::Serialize;
 use serde_json::{Map, Value};

@@ -220,7 +220,7 @@ impl MapReport {
         data["category"] = json!(self.grids.first().map(category));
         data["boundary"] = json!(BOUNDARY);
         data["caseWords"] = json!(size_of::<LaneCase<f32>>() / 4);
-        // What the constants of lanes that keep their steps have else.
+        // The constants in which a lane that keeps its steps differs.
         data["traced"] = json!({ "frame_values": 1, "frame_skip": 0 });
         let shown = self.shown_outcomes();
         let grid = |mapped: &MappedGrid| {

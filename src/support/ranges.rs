@@ -121,7 +121,8 @@ pub fn refuse_repeats<K: Eq + Hash, S: Display>(
     Ok(())
 }
 
-/// Declares tables of the configuration, as [`settings!`](crate::settings); each is read, written, and in the schema.
+/// Declares tables of the configuration, as [`settings!`](crate::settings) does, with what reads them, writes them and makes
+/// their schema.
 #[macro_export]
 macro_rules! config_tables {
     ($($(#[$about:meta])* $vis:vis struct $table:ident { $($fields:tt)* })*) => {

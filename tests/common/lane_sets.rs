@@ -81,14 +81,16 @@ pub fn run_lane<R: Real>(
 
 /// All lanes of a plan at once.
 pub fn swept(plan: &LanePlan, backend: &dyn Backend, wanted: Wanted) -> Chunk {
-    backend.prepare(plan).unwrap().run(0..plan.unit_count(), wanted).unwrap()
+    let chunk = backend.prepare(plan).unwrap().run(0..plan.unit_count(), wanted).unwrap();
+    chunk.check(plan).unwrap();
+    chunk
 }
 
 pub fn swept_on_cpu(plan: &LanePlan, wanted: Wanted) -> Chunk {
     swept(plan, &CpuBackend::lane_arithmetic(), wanted)
 }
 
-/// So many units at a time: outcomes and, asked for separately, verdicts are the words of the lanes of `expected`.
+/// Runs so many units at a time: outcomes, and verdicts asked for alone, equal those of `expected` bit for bit.
 pub fn assert_same_in_calls(plan: &LanePlan, backend: &dyn Backend, units: u64, expected: &[Outcome<f64>], what: &str) {
     let mut session = backend.prepare(plan).unwrap();
     let (mut from, mut outcomes, mut verdicts) = (0, Vec::new(), Vec::new());
@@ -98,7 +100,7 @@ pub fn assert_same_in_calls(plan: &LanePlan, backend: &dyn Backend, units: u64, 
         verdicts.extend(session.run(from..to, Wanted::Verdicts).unwrap().verdicts);
         from = to;
     }
-    assert!(outcomes.len() == expected.len() && verdicts.len() == expected.len(), "{what}");
+    assert!([outcomes.len(), verdicts.len(), expected.len()] == [plan.lane_count() as usize; 3], "{what}");
     let differs = |at: &usize| !same_words(&outcomes[*at], &expected[*at]) || verdicts[*at] != expected[*at].verdicts;
     let first = (0..expected.len()).find(differs).map(|at| plan.key_text(&plan.key(at as u64).unwrap()));
     assert_eq!(first, None, "{what}, {}", backend.describe());

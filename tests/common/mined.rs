@@ -10,7 +10,7 @@ use lanesweep::traffic::mining::mine;
 use lanesweep::traffic::trajectory::generator::generate_one;
 use rayon::prelude::*;
 
-/// Those of the first recordings, each mined once: it is the same whatever their number.
+/// The scenarios of the first recordings. Each recording is mined once: its scenarios do not depend on how many are asked for.
 pub fn scenarios_of(recordings: usize) -> &'static [Scenario] {
     type Known = (Vec<Vec<Scenario>>, BTreeMap<usize, &'static [Scenario]>);
     static KNOWN: Mutex<Known> = Mutex::new((Vec::new(), BTreeMap::new()));

@@ -91,7 +91,7 @@ pub fn send(signal: &str, pid: u32) {
     assert!(Command::new("kill").args([format!("-{signal}"), pid.to_string()]).status().unwrap().success());
 }
 
-/// Names of a folder's entries; none where there is no folder.
+/// Paths of all files below a folder, from it on; none where there is no folder.
 pub fn names(dir: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(dir).into_iter().flatten().flatten();
     let name = |entry: std::fs::DirEntry| entry.file_name().into_string().unwrap();

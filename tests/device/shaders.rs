@@ -497,7 +497,9 @@ fn only_the_entry_has_bindings_and_every_file_stays_short_and_plain() {
 
 #[test]
 fn a_loop_that_counts_up_to_no_constant_and_a_variable_in_one_that_begins_with_nothing_are_found() {
-    let body = |declared: &str| format!("fn f() {{\n  loop {{\n    {declared}\n  }}\n  var y: u32;\n}}");
+    let body = |declared: &str| {
+        format!("fn f() {{\n  for (var k = 0u; k < 9u; k++) {{\n    {declared}\n  }}\n  var y: u32;\n}}")
+    };
     assert_eq!(uninitialized_in_loops(&body("var x: u32;")), ["var x: u32;"]);
     assert!(uninitialized_in_loops(&body("var x: u32 = 0u;")).is_empty());
     for (body, counted) in [

@@ -153,8 +153,8 @@ fn what_happens_after_a_step_decides_nothing_before_it() {
     assert!(compared > 100_000, "{compared}");
 }
 
-/// TTC has no such property: the shorter headway makes the ego brake earlier, and a longer one may meet the
-/// leader at a higher closing speed. Kept as a counterexample.
+/// Collisions with RSS have this property. TTC has not: the shorter headway makes the ego brake earlier, and a longer one may
+/// meet the leader at a higher closing speed. Kept as a counterexample.
 #[test]
 fn a_longer_headway_never_turns_an_rss_lvd_pass_into_a_collision_but_may_turn_one_into_a_ttc_failure() {
     let profile = paper();

@@ -130,7 +130,7 @@ fn cases_1_to_3_a_leader_that_brakes_at_6_is_seen_after_0_4_s_and_answered_after
 }
 
 #[test]
-fn cases_4_to_6_a_cut_in_with_1_3_s_at_lane_intrusion_has_to_be_avoided_and_is() {
+fn cases_4_to_6_a_cut_in_with_1_3_s_at_lane_intrusion_has_to_be_avoided_and_one_with_0_94_s_has_not() {
     // Lane intrusion: 0.5 m of lateral gap, centre at 2.4 m, after 1.1 m or 1.1 s. Closing at 8.333 m/s.
     let judgement = judged(&cut_in(V / 2.0), Headway::GapM(20.0));
     let closing = V / 2.0;

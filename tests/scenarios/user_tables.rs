@@ -181,7 +181,10 @@ fn a_truncated_parquet_file_is_told_as_one_and_no_panic_is_printed() {
         std::fs::write(&path, content).unwrap();
         let (code, text) = said(dir.path(), "study --scenarios s.parquet");
         assert!(code == 3 && text.contains("s.parquet: not a Parquet file that can be read"), "{text}");
-        assert!(text.contains("help: write the file again, or use JSON Lines or CSV"), "{text}");
+        assert!(
+            text.contains("help: write the file again, with compression=\"zstd\", or use JSON Lines or CSV"),
+            "{text}"
+        );
         assert!(!text.contains("panicked"), "{text}");
     }
 }

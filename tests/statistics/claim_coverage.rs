@@ -46,7 +46,7 @@ impl Uniform {
     }
 }
 
-/// Of ten headways S and S' fail at the first ones, so many each.
+/// S and S' fail at the first of ten headways, each at so many.
 pub fn confusion(s: i32, s_prime: i32) -> Confusion<u32> {
     let count = |n: i32| n.max(0) as u32;
     let (tp, fn_, fp) = (count(s.min(s_prime)), count(s - s_prime), count(s_prime - s));

@@ -153,7 +153,7 @@ fn sampled_scenarios(n: usize, [mean, spread]: [f64; 2], seed: u64) -> (Vec<u64>
     (runs, failures)
 }
 
-/// Lanes in which S, S' and either of them fail, of one scenario.
+/// The counts of one scenario whose S fails, and whose S' differs from S, with these probabilities.
 fn scenario(random: &mut Uniform, failing: f64, wrong: f64) -> Confusion<u32> {
     let s = if random.next() < failing { random.failing() } else { 0 };
     let shift = random.shift();

@@ -81,7 +81,7 @@ fn sums_of_a_proposal_are_the_same_bits_in_any_division_of_the_indices_and_a_sea
     assert_eq!(with_threads(1, search), search());
 }
 
-/// Of the first question, within a fraction of the truth.
+/// Checks the estimate of the first question, which lies within a fraction of the truth.
 fn assert_found(
     what: &str,
     density: &dyn Density,

@@ -190,5 +190,5 @@ fn parquet_with_gzip_or_lz4_and_microseconds_is_the_table_and_instants_are_refus
     let instants = times.as_primitive::<Int64Type>().reinterpret_cast::<TimestampMicrosecondType>();
     *times = std::sync::Arc::new(instants);
     let error = through(columns, gzip).unwrap_err();
-    assert!(error.help().unwrap().contains("a time to int64"), "{error:?}");
+    assert!(error.help().unwrap().contains("cast times to int64"), "{error:?}");
 }

@@ -14,7 +14,7 @@ const START_BYTES: u64 = 1 << 16;
 
 pub(super) struct CsvRows {
     path: PathBuf,
-    /// It ends within a row that is too long.
+    /// Gives at most [`MAX_ROW_BYTES`] for each row: a longer row ends early.
     reader: csv::Reader<Take<Box<dyn Read + Send>>>,
     record: csv::StringRecord,
     wanted: Vec<usize>,
@@ -113,7 +113,7 @@ impl TableRows for CsvRows {
 }
 
 impl CsvRows {
-    /// What was read of a row that is not too long.
+    /// Returns what was read, or the error for a row that is too long.
     fn within<T>(&self, read: csv::Result<T>) -> Result<T> {
         if self.reader.get_ref().limit() == 0 {
             let problem = format!("a row is longer than {} MiB", MAX_ROW_BYTES >> 20);

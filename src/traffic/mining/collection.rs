@@ -276,21 +276,21 @@ pub fn mine_generated(
 }
 
 /// Noise of accelerations above this fraction of the threshold of the peak can decide. Drivers who dawdle, as those of SUMO, make 0.22.
-const MAX_FRACTION: f64 = 0.3;
+const MAX_NOISE_FRACTION: f64 = 0.3;
 /// Lateral motion over the window of mining is so many standard deviations of noise at most by chance.
-const LATERAL_DEVIATIONS: f64 = 4.0;
+const MIN_LATERAL_DEVIATIONS: f64 = 4.0;
 
 /// Notes on a recording whose noise can decide what is mined; none for good data.
 fn noise_notes(recording: &Recording, options: &MiningOptions) -> impl Iterator<Item = String> {
     let (noise, window_s) = (Noise::of(recording), options.lateral.window_s);
     let (threshold, calm_m) = (options.lvd.min_peak_deceleration_mps2, options.lateral.quiescent_speed_mps * window_s);
     let [peak, acceleration] = [value(threshold), significant(noise.acceleration_mps2, 2)];
-    let of_peaks = (threshold > 0.0 && noise.acceleration_mps2 > MAX_FRACTION * threshold).then(|| format!(
+    let of_peaks = (threshold > 0.0 && noise.acceleration_mps2 > MAX_NOISE_FRACTION * threshold).then(|| format!(
         "noise can decide which leader decelerations are found and kept: that of accelerations is {acceleration} m/s², the threshold of \
          the peak {peak} m/s²; smooth the positions by `smoothing_s` in a preset, 1 s and longer"
     ));
     let [lateral, calm, window] = [significant(noise.lateral_m, 2), significant(calm_m, 2), value(window_s)];
-    let of_changes = (LATERAL_DEVIATIONS * noise.lateral_m > calm_m).then(|| format!(
+    let of_changes = (MIN_LATERAL_DEVIATIONS * noise.lateral_m > calm_m).then(|| format!(
         "noise can decide when lane changes begin and end: that of positions across the road is {lateral} m, and less than {calm} m in \
          {window} s count as no lateral motion"
     ));

@@ -85,10 +85,10 @@ fn detect(v: &[f64], window: usize, options: &LongitudinalOptions) -> Vec<Longit
     let mut now = Cruising;
     let mut end = None;
     for k in window..v.len() {
-        let others =
+        let mut others =
             [(Accelerating, &rise), (Decelerating, &fall)].into_iter().filter(|(activity, _)| *activity != now);
         let begun =
-            { others }.find_map(|(activity, series)| Some((activity, series.start(k, options.min_speed_change_mps)?)));
+            others.find_map(|(activity, series)| Some((activity, series.start(k, options.min_speed_change_mps)?)));
         (now, end) = match begun {
             Some(begun) => begun,
             None if end == Some(k) => (Cruising, None),

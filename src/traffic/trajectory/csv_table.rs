@@ -287,7 +287,7 @@ impl CsvTable {
 
     fn unreadable(&self, error: csv::Error) -> Error {
         match error.into_kind() {
-            csv::ErrorKind::Io(source) if source.kind() == IS_ENDLESS => Error::input(
+            csv::ErrorKind::Io(source) if source.kind() == ENDLESS_LINE => Error::input(
                 Place::file(&self.path).row(self.last_line + 1),
                 format!("neither line nor quotation ends here within {} MiB", MAX_LINE_BYTES >> 20),
                 "remove an open quotation mark, or copy or export the file again",
@@ -370,14 +370,14 @@ struct HashingReader {
     line_from: u64,
 }
 
-/// Kind of the error for a line that is too long.
-const IS_ENDLESS: io::ErrorKind = io::ErrorKind::OutOfMemory;
+/// Kind of the error for a line that is too long; reading a file never gives it.
+const ENDLESS_LINE: io::ErrorKind = io::ErrorKind::FileTooLarge;
 
 impl Read for HashingReader {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         // The line has no end so far, and memory would have to hold all of it.
         if self.bytes - self.line_from.min(self.bytes) > MAX_LINE_BYTES {
-            return Err(IS_ENDLESS.into());
+            return Err(ENDLESS_LINE.into());
         }
         let count = self.inner.read(buffer)?;
         self.hash.update(&buffer[..count]);

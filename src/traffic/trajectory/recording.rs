@@ -40,7 +40,8 @@ pub struct Loaded {
     pub vehicle_names: BTreeMap<u32, String>,
     /// The frame of the file at frame 0 of the recording, and frames of the file per frame; `None` if they are the same.
     pub file_frames: Option<[i64; 2]>,
-    /// What was understood of them; empty before the checks.
+    /// What was understood of the tracks: empty before the checks, and without findings after
+    /// [`InputFile::read`](super::InputFile::read).
     pub understanding: Understanding,
 }
 

@@ -56,6 +56,7 @@ pub(super) struct Vehicle {
     /// Time until the next lane change is possible, s.
     pub settle_s: f64,
     /// The camera's samples, by number: along the road from the start of its view, and to the left of the leftmost line.
+    /// Size, class and lanes are not set.
     pub samples: Track,
 }
 

@@ -136,7 +136,7 @@ fn problem(recording: &Recording) -> Option<&'static str> {
     ])
 }
 
-/// The first problem that there is.
+/// Returns the first problem whose condition holds.
 fn first_of<const N: usize>(problems: [(bool, &'static str); N]) -> Option<&'static str> {
     problems.into_iter().find(|(is_there, _)| *is_there).map(|(_, problem)| problem)
 }

@@ -287,7 +287,7 @@ impl Understanding {
                 at.map(|(of, k)| sign * (of.v_s_mps[k + 1] - of.v_s_mps[k - 1]) * rate_hz / 2.0).collect();
             let told_mps2 = told.iter().sum::<f64>() / told.len() as f64;
             if told.len() >= MIN_CLIPPED && told_mps2 > extreme + MIN_BEYOND_MPS2 {
-                let (side, number) = (if sign > 0.0 { "above" } else { "below" }, count(told.len() as u64));
+                let (side, number) = (if sign > 0.0 { "above" } else { "below" }, count(told.len()));
                 let [extreme, told] = [extreme, told_mps2].map(|value| significant(sign * value, 2));
                 self.warn(format!("no acceleration is {side} {extreme} m/s², which {number} samples have, although their speeds change by {told} m/s² on average: they were clipped; without the column they follow from speeds"));
             }

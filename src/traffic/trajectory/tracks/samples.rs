@@ -152,7 +152,9 @@ pub(super) fn number(value: f64) -> Option<u32> {
 pub(super) fn between(before: &Sample, after: &Sample, part: f64) -> Sample {
     std::array::from_fn(|column| {
         let (a, b) = (before[column], after[column]);
-        match if column >= LANE { part.round() } else { part } {
+        // Lanes and classes have no value between two.
+        let part = if column >= LANE { part.round() } else { part };
+        match part {
             0.0 => a,
             1.0 => b,
             part => a + part * (b - a),

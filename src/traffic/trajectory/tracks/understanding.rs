@@ -213,7 +213,7 @@ impl Understanding {
         }
         let of_class = |class: VehicleClass, name: &str| {
             let mut lengths_m = lengths_m(recording, class);
-            format!("{} {name} of {} m", count(lengths_m.len() as u64), significant(median(&mut lengths_m), 3))
+            format!("{} {name} of {} m", count(lengths_m.len()), significant(median(&mut lengths_m), 3))
         };
         let (cars, lorries) = (of_class(VehicleClass::Car, "cars"), of_class(VehicleClass::Truck, "lorries"));
         let samples = count(recording.tracks.iter().map(|track| track.len() as u64).sum::<u64>());
