@@ -1,7 +1,7 @@
 """How far from a limit can binary32 and binary64 judge a case differently? `python benches/python/robust.py CASES SEED`.
 
 Runs random cut-ins and leader decelerations in both, and prints as CSV, per kind, profile and driver: the cases, the differing
-verdicts, those that `robust` misses, and the largest distance from a contact of a differing one, in metres and in m/s.
+verdicts, those that `robust` misses, and the largest distance from a contact where one of the two has none, in metres and in m/s.
 """
 
 import sys
@@ -34,7 +34,7 @@ for kind, case in kinds.items():
             cases = {"ego_speed_kmh": ego, **case}
             fast, exact = (lanesweep.simulate(cases, reference=of, **run).to_polars() for of in (False, True))
             differing = fast.filter(pl.any_horizontal(*(fast[name] != exact[name] for name in verdicts)))
-            contacts = differing["collision"]
-            gap = differing.filter(~contacts)["min_gap_m"].max()
-            closing = differing.filter(contacts)["impact_closing_speed_mps"].max()
+            contacts = fast.filter(fast["collision"] != exact["collision"])
+            gap = contacts.filter(~contacts["collision"])["min_gap_m"].max()
+            closing = contacts.filter(contacts["collision"])["impact_closing_speed_mps"].max()
             print(kind, profile, model, count, len(differing), differing["robust"].sum(), gap, closing, sep=",")

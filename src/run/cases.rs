@@ -93,8 +93,8 @@ impl Cases {
     }
 }
 
-/// Whether a verdict is within 2 cm or 1.5 m/s of a contact, or within 7 % of a threshold: twice as far as any
-/// difference between the arithmetics that `benches/python/robust.py` finds in cut-ins and decelerations.
+/// Whether a verdict is within 2 cm or 1.5 m/s of a contact, or within 7 % of a threshold: nearly all verdicts
+/// that differ between the arithmetics do so there (`benches/python/robust.py`).
 fn is_near_a_limit(outcome: &Outcome<f64>, profile: &Profile) -> bool {
     let near = |value: f64, limit: f64| (value - limit).abs() <= 0.07 * limit;
     let of_contact =
