@@ -16,7 +16,7 @@ use made::{Read, read};
 #[test]
 fn a_study_gives_the_same_bytes_from_parquet_and_from_json_lines() {
     let at = &*crate::common::folder();
-    ran(at, "-q tracks --convert rec --synth-recordings 3");
+    ran(at, "-q tracks --convert rec --synth-recordings 2");
     ran(at, "-q mine rec --out s.jsonl");
     ran(at, "-q mine rec --out s.parquet");
     let study = "-q study --backend cpu --config study.keep_plan=never";
