@@ -557,12 +557,12 @@ def test_importance_sampling_with_a_driver_moves_a_bar_and_ends(density, monkeyp
     monkeypatch.setattr(_run, "progress", lambda: (lambda *bar: seen.append(bar), lambda: None))
     options = {"estimator": "is", "half_width": 0.5, "thw": 0.4}
     (ours,) = lanesweep.sample(density, models=[Reg157()], **options).table("estimates").to_polars().rows(named=True)
-    searched, bounded = [done for what, done, _ in seen if what == "searching"], list(seen)
+    searched, bounded = [done for what, done, _ in seen if what == "searching, at most"], list(seen)
     (theirs,) = lanesweep.sample(density, models="Reg157", **options).table("estimates").to_polars().rows(named=True)
     assert ours["low"] < theirs["probability"] < ours["high"]
     assert len(set(searched)) > 2 and all(0 <= done <= total for _, done, total in seen)
     # A driver that never fails would be drawn for two million times.
-    assert all(total < 500_000 for what, _, total in bounded if what == "searching")
+    assert all(total < 500_000 for what, _, total in bounded if what == "searching, at most")
     # One that may accelerate is slow, and that is said before it starts.
     with caplog.at_level("WARNING", logger="lanesweep"), pytest.raises(lanesweep.RunStopped):
         lanesweep.sample(density, models=[IDM()], **options, config={"run": {"stop_after_s": 1}})
