@@ -22,15 +22,13 @@ pub use published::{Misfit, PublishedFailures, published_failures, published_lvd
 pub use statistic::Statistic;
 
 use rayon::prelude::*;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 use lanesweep_engine::{Confusion, Headway, LanePlan, Partial, UnitCounts};
 use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::ModelId;
 use lanesweep_model::scenario::Category;
 use lanesweep_model::scenario::parameterization::Parameterization;
-use lanesweep_support::{Error, Place, Result, ranges, settings};
+use lanesweep_support::{Error, Place, Result, config_tables, ranges};
 
 /// Ending of the name of a parameterization that replays each scenario by a basis that has not seen it.
 pub const CROSS_VALIDATED: &str = "-cv";
@@ -219,10 +217,8 @@ pub fn score(plan: &LanePlan, partial: &Partial, options: &ScoreOptions) -> Resu
     Ok(ScoreTable { categories, headways: plan.headways.clone(), options: options.clone() })
 }
 
-settings! {
+config_tables! {
     /// How scores are made.
-    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-    #[serde(deny_unknown_fields, default)]
     pub struct ScoreOptions {
         /// Seed that chooses the lanes to check on the CPU. No score depends on it.
         #[schemars(extend("x-flag" = "seed", "x-verbs" = ["study"], "x-heading" = "Run"))]

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use lanesweep_support::{Result, ranges, settings};
+use lanesweep_support::{Result, config_tables, ranges};
 
 /// What a constant acceleration does after the scenario's duration T.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -66,10 +66,8 @@ pub enum SvdFit {
     All,
 }
 
-settings! {
+config_tables! {
     /// Options of all parameterizations.
-    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-    #[serde(deny_unknown_fields, default)]
     pub struct ParameterizationOptions {
         /// Constant acceleration after T (2, 4, b, d).
         pub after_duration: AfterDuration = AfterDuration::Hold,
