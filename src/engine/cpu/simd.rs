@@ -46,7 +46,7 @@ impl<M> Burst<M> {
 /// The function of a set of rules: one instance per set.
 macro_rules! for_rules {
     ($burst:ident, $model:ty, $rules:expr) => {
-        for_rules!($burst, $model, $rules, 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21)
+        for_rules!($burst, $model, $rules, 0 1 2 3 4 5 6 7 8 9 10 11 12 13 18 19 20 21)
     };
     ($burst:ident, $model:ty, $rules:expr, $($set:literal)*) => {
         match Rules::ALL.iter().position(|set| *set == $rules)? {
