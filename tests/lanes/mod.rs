@@ -2,6 +2,7 @@
 
 mod conformance;
 mod domain_claims;
+mod foreign_driver;
 mod hand_calculated;
 mod measures;
 mod partial;

@@ -3,7 +3,7 @@
 use crate::common::lane_sets::{self, assert_same_in_calls, forms, random, small_study, swept, thresholds};
 use crate::common::mined::scenarios_of;
 use crate::common::with_threads;
-use lanesweep::engine::{Backend, Instructions, LanePlan};
+use lanesweep::engine::{Backend, Instructions, LanePlan, RecheckBy, RecheckOptions};
 use lanesweep::prelude::*;
 use lanesweep::run::study::plan_study;
 
@@ -64,6 +64,18 @@ fn any_number_of_headways_gives_the_same_words() {
         let headways = (1..=count).map(|k| Headway::ThwS(3.0 * f64::from(k) / f64::from(count))).collect();
         let options = StudyOptions { headways, ..StudyOptions::default() };
         assert_equal(&format!("{count} headways"), &plan_study(&scenarios, profile, &options).unwrap());
+    }
+}
+
+/// One in a hundred of the lanes of batches that skip steps; others are not recomputed.
+#[test]
+fn a_sample_of_the_lanes_is_recomputed_and_passes() {
+    let (plan, cpu) = (random(&Profile::load("paper").unwrap(), 3000), CpuBackend::lane_arithmetic());
+    for wanted in [Wanted::Verdicts, Wanted::Outcomes] {
+        let executor = Executor { recheck: Some(RecheckOptions { seed: 7, one_in: 100 }), ..Executor::new(&cpu) };
+        let summary = executor.sweep(&plan, 0..plan.unit_count(), wanted, |_| Ok(())).unwrap();
+        let is_checked = cpu.rechecked_by(wanted) != RecheckBy::Nothing;
+        assert_eq!(summary.rechecked_lanes, if is_checked { plan.lane_count().div_ceil(100) } else { 0 }, "{wanted:?}");
     }
 }
 
