@@ -114,7 +114,7 @@ def run(
     function: str,
     call: str,
     arguments: dict[str, bool | list[str | Path]],
-    on_progress: Callable[[str, int, int], None] | None = None,
+    on_progress: Callable[[str, int, int | None], None] | None = None,
     on_message: Callable[[str, str], None] | None = None,
 ) -> tuple[int, str, str, list[tuple[str, Frame]]]: ...
 def main(words: Sequence[str]) -> int: ...

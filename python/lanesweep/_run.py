@@ -33,7 +33,7 @@ def on_message(level: str, line: str) -> None:
     _log.log(_LEVELS.get(level, logging.INFO), "%s", line)
 
 
-def progress() -> tuple[Callable[[str, int, int], None] | None, Callable[[], None]]:
+def progress() -> tuple[Callable[[str, int, int | None], None] | None, Callable[[], None]]:
     """Return a callback that moves a bar, and one that closes it.
 
     The bar is that of `tqdm` if it is installed; in a terminal or notebook only.
@@ -49,7 +49,7 @@ def progress() -> tuple[Callable[[str, int, int], None] | None, Callable[[], Non
         return None, lambda: None
     bar: Any = None
 
-    def move(what: str, done: int, total: int) -> None:
+    def move(what: str, done: int, total: int | None) -> None:
         nonlocal bar
         if bar is None or bar.total != total:
             close()

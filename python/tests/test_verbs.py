@@ -274,6 +274,14 @@ def test_input_that_is_left_out_is_named_in_the_messages(tmp_path) -> None:
     assert mined.status == "incomplete" and any("02_tracks.csv" in line for line in mined.messages)
 
 
+def test_the_bar_of_a_table_whose_rows_nobody_counted_has_no_end(monkeypatch) -> None:
+    seen: list[tuple[str, int, int | None]] = []
+    monkeypatch.setattr(lanesweep._run, "progress", lambda: (lambda *bar: seen.append(bar), lambda: None))
+    case = {"category": "cut-in", "ego_speed_mps": 20.0, "speed_mps": 15.0, "lateral_speed_mps": 1.0}
+    lanesweep.check(pd.DataFrame([case | {"gap_m": float(gap)} for gap in range(10, 310)]))
+    assert {(what, total) for what, _, total in seen} == {("judging", None)}
+
+
 def test_runs_of_two_threads_take_turns(density) -> None:
     def probability(seed: int) -> object:
         return lanesweep.sample(density, samples=20_000, thw=1.2, models="FSM", backend="cpu", seed=seed).document["estimates"]

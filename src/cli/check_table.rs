@@ -46,7 +46,7 @@ impl CheckedTable<'_> {
         let (mut doubts, is_nominal) = (Doubts::new(self.check.plausibility.policy()), self.check.nominal);
         let opened = is_nominal.then(|| configured.open()).transpose()?;
         let (mut cases, mut broken, mut is_end) = (Vec::new(), Vec::new(), false);
-        configured.with_bar(u64::MAX, "judging", |bar| {
+        configured.with_bar(None, "judging", |bar| {
             while !is_end {
                 let mut rows: Vec<Row> = Vec::new();
                 while rows.len() < ROWS[usize::from(is_nominal)] && !is_end {

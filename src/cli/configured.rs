@@ -240,11 +240,11 @@ impl Configured {
     /// Those of the work.
     pub(super) fn with_bar<T>(
         &self,
-        units: u64,
+        units: impl Into<Option<u64>>,
         what: &str,
         work: impl FnOnce(&ProgressBar) -> Result<T>,
     ) -> Result<T> {
-        let bar = console::progress(self.level, units, what);
+        let bar = console::progress(self.level, units.into(), what);
         let done = work(&bar);
         bar.finish_and_clear();
         done

@@ -144,14 +144,16 @@ pub(super) fn command_line(words: &[OsString]) -> String {
     format!("lanesweep {}", words.collect::<Vec<_>>().join(" "))
 }
 
-/// A progress bar on stderr, or a line now and then if stderr is no terminal. Its remaining time follows from the units per time.
-pub(super) fn progress(level: Level, units: u64, what: &str) -> ProgressBar {
-    let bar = ProgressBar::new(units);
+/// A progress bar on stderr, or a line now and then if stderr is no terminal. Its remaining time follows from the units per time;
+/// nobody knows it where the number of units is not known.
+pub(super) fn progress(level: Level, units: Option<u64>, what: &str) -> ProgressBar {
+    let bar = units.map_or_else(ProgressBar::no_length, ProgressBar::new);
     let is_terminal = io::stderr().is_terminal();
     if level == Level::ERROR || !is_terminal {
         bar.set_draw_target(ProgressDrawTarget::hidden());
     }
-    if let Ok(style) = ProgressStyle::with_template("{msg:24} {wide_bar} {pos}/{len} {elapsed}{left}") {
+    let done = if units.is_some() { "{wide_bar} {pos}/{len}" } else { "{pos}" };
+    if let Ok(style) = ProgressStyle::with_template(&format!("{{msg:24}} {done} {{elapsed}}{{left}}")) {
         bar.set_style(style.with_key("left", |state: &ProgressState, out: &mut dyn fmt::Write| {
             let measured = (state.pos() > 0).then(|| state.elapsed());
             // A bar that cannot be drawn is no error of the run.
@@ -187,9 +189,12 @@ fn log_at_intervals(bar: &WeakProgressBar) {
     }
 }
 
-/// `sweeping: 1,200 of 9,600 (12 %) in 2 minutes, about 15 minutes left`.
+/// `sweeping: 1,200 of 9,600 (12 %) in 2 minutes, about 15 minutes left`, or `judging: 1,200 in 2 minutes`.
 fn line_of(bar: &ProgressBar) -> String {
-    let (what, done, all, elapsed) = (bar.message(), bar.position(), bar.length().unwrap_or_default(), bar.elapsed());
+    let (what, done, elapsed) = (bar.message(), bar.position(), bar.elapsed());
+    let Some(all) = bar.length() else {
+        return format!("{what}: {} in {:#}", count(done), HumanDuration(elapsed));
+    };
     let parts = done as f64 / all.max(1) as f64;
     // At the mean speed so far.
     let left = if done > 0 { elapsed.mul_f64((1.0 / parts - 1.0).max(0.0)) } else { Duration::ZERO };

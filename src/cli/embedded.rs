@@ -90,11 +90,11 @@ pub fn token() -> Cancel {
     CANCEL.clone()
 }
 
-/// The present work of the running verb: what it is, the units done, and all units.
-pub fn progress() -> Option<(String, u64, u64)> {
+/// The present work of the running verb: what it is, the units done, and all units if their number is known.
+pub fn progress() -> Option<(String, u64, Option<u64>)> {
     let captured = console::captured();
     let bar = captured.as_ref()?.bar.as_ref()?;
-    (!bar.is_finished()).then(|| (bar.message(), bar.position(), bar.length().unwrap_or(0)))
+    (!bar.is_finished()).then(|| (bar.message(), bar.position(), bar.length()))
 }
 
 /// Takes the lines of the log and of standard error since the last call, with their levels.

@@ -225,7 +225,7 @@ mod tests {
     enum FalsePromise {
         /// A safe distance of 0, where the driver brakes from 40 m down to 20 m.
         SafeGap,
-        /// Every vehicle beside the lane is ignored.
+        /// Every vehicle beside the lane is ignored, where the driver brakes for them.
         Ignores,
         /// The driver follows steadily at every gap, and `check_steady` never reacts.
         Ease,
@@ -264,11 +264,14 @@ mod tests {
 
         fn check(&self, view: &View<f32>) -> Hazard<f32> {
             let hazard = self.0.check(view);
-            if self.1 != FalsePromise::SafeGap {
-                return hazard;
-            }
-            let brakes = Flag::of(view.gap > 20.0 && view.gap < 40.0) & view.lateral_gap.is_negative();
-            Hazard { is_unsafe: brakes, ..hazard }
+            let is_unsafe = match self.1 {
+                FalsePromise::SafeGap => Flag::of(view.gap > 20.0 && view.gap < 40.0) & view.lateral_gap.is_negative(),
+                FalsePromise::Ignores => {
+                    hazard.is_unsafe | (Flag::of(view.gap < 40.0) & !view.lateral_gap.is_negative())
+                }
+                FalsePromise::Ease => hazard.is_unsafe,
+            };
+            Hazard { is_unsafe, ..hazard }
         }
 
         fn shader_constants(&self) -> Vec<(&'static str, f64)> {
@@ -406,9 +409,9 @@ mod tests {
     /// The same lanes are selected for any division into chunks.
     #[test]
     fn seed_and_lane_alone_choose_what_is_checked() {
-        let (options, end) = (RecheckOptions { seed: 7, one_in: 100 }, 123_456);
+        let (options, end) = (RecheckOptions { seed: 7, one_in: 100 }, 123_400);
         let all: Vec<u64> = options.chosen(0..end).collect();
-        assert_eq!(all.len(), 1235);
+        assert_eq!(all.len(), 1234);
         for cut in [1, 99, 100, 12_345] {
             let parts = (0..end).step_by(cut).flat_map(|from| options.chosen(from..(from + cut as u64).min(end)));
             assert_eq!(parts.collect::<Vec<_>>(), all, "{cut}");
