@@ -4,10 +4,10 @@ use std::collections::{BTreeMap, HashSet};
 
 use crate::common::lane_sets::{self, run_lane, swept_on_cpu};
 use lanesweep::engine::verify::{SetOptions, Threshold, random_plan};
-use lanesweep::engine::{Constants, EndReason, LaneCase, LanePlan, Step};
+use lanesweep::engine::{Constants, EndReason, LaneCase, LanePlan, Start, Step};
 use lanesweep::model::driver::View;
 use lanesweep::prelude::*;
-use lanesweep::scenario::{LATERAL_SAMPLED, SPEED_SAMPLED};
+use lanesweep::scenario::{LATERAL_SAMPLED, SPEED_SAMPLED, Tables};
 
 fn random(name: &str, lanes: u64) -> LanePlan {
     lane_sets::random(&Profile::load(name).unwrap(), lanes)
@@ -77,16 +77,19 @@ fn every_criterion_fails_and_passes_often_for_every_model_in_every_category() {
 }
 
 /// What a lane sees of its vehicles at step 0, in the lane arithmetic: views, lateral positions.
-fn first_step(plan: &LanePlan, block: usize, case: &LaneCase<f64>, headway: usize) -> Vec<(View<f32>, f32)> {
-    let constants = Constants::<f32>::resolve(&plan.profile, plan.blocks[block].category);
-    let case = case.cast::<f32>();
+fn first_step(
+    constants: &Constants<f32>,
+    tables: &Tables<f32>,
+    case: &LaneCase<f32>,
+    start: Start<f32>,
+) -> Vec<(View<f32>, f32)> {
     let mut first = Vec::new();
     let mut observer = |step: &Step<f32>| {
         if step.index == 0 {
             first = step.seen[..1 + case.pair as usize].iter().map(|seen| (seen.view, seen.lateral)).collect();
         }
     };
-    run_lane(&constants, ModelId::Fsm, (&case, &plan.tables().cast()), plan.headways[headway].start(), &mut observer);
+    run_lane(constants, ModelId::Fsm, (case, tables), start, &mut observer);
     first
 }
 
@@ -161,7 +164,10 @@ const UNITS: u64 = 24;
 fn lanes_sit_exactly_on_each_threshold_with_a_neighbour_on_either_side() {
     for name in ["paper", "jrc-2021", "un-r157"] {
         let plan = thresholds(name, UNITS);
+        let (tables, mut ends_at_once) = (plan.tables().cast(), plan.profile.clone());
+        ends_at_once.frame.time_cap_s = ends_at_once.frame.dt_s;
         for block in 0..plan.blocks.len() {
+            let constants = Constants::resolve(&ends_at_once, plan.blocks[block].category);
             for threshold in Threshold::ALL {
                 let (mut on, mut between, mut in_time) = (0, 0, false);
                 let units = (0..plan.blocks[block].units.len()).filter(|&unit| Threshold::of_unit(unit) == threshold);
@@ -171,7 +177,11 @@ fn lanes_sit_exactly_on_each_threshold_with_a_neighbour_on_either_side() {
                         let case = plan.case(block, unit, side);
                         let of = (&plan.profile, plan.blocks[block].category);
                         let both = |seen: &(View<f32>, f32)| sides(threshold, of, seen, case.ego_width as f32);
-                        first_step(&plan, block, &case, headway).iter().map(both).collect::<Option<Vec<_>>>()
+                        let start = plan.headways[headway].start();
+                        first_step(&constants, &tables, &case.cast(), start)
+                            .iter()
+                            .map(both)
+                            .collect::<Option<Vec<_>>>()
                     });
                     let [Some(exact), Some(below), Some(above)] = seen else {
                         in_time = true;

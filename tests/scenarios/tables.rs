@@ -19,7 +19,7 @@ fn a_study_gives_the_same_bytes_from_parquet_and_from_json_lines() {
     ran(at, "-q tracks --convert rec --synth-recordings 2");
     ran(at, "-q mine rec --out s.jsonl");
     ran(at, "-q mine rec --out s.parquet");
-    let study = "-q study --backend cpu --config study.keep_plan=never";
+    let study = "-q study --backend cpu --thw 1.2,0.4 --config study.keep_plan=never";
     for of in ["--scenarios s.jsonl --threads 2 --out a", "--scenarios s.parquet --threads 1 --out b"] {
         for ending in ["csv", "parquet", "jsonl"] {
             ran(at, &format!("{study} {of} --rows {}.{ending}", &of[of.len() - 1..]));
@@ -36,7 +36,7 @@ fn a_study_gives_the_same_bytes_from_parquet_and_from_json_lines() {
     assert_eq!(scenarios.key_values["lanesweep.synthetic"], "true");
     // What `mine` knew of its recordings stands in the records of a study of either file; of other scenarios it is a note.
     let record = |data: &str| {
-        ran(at, &format!("{study} {data} --models FSM --thw 0.6 --out of"));
+        ran(at, &format!("{study} {data} --models FSM --out of"));
         let record = json(&at.join("of/run.json"));
         ["recordings", "mining", "notes"].map(|key| record[key].clone())
     };
