@@ -187,7 +187,7 @@ fn sampled_columns(density: &DensityModel) -> Vec<Column> {
         c("kernel", ColumnKind::Whole, "1", "Kernel of the sample, from 0: the one that it was drawn from, or that explains a sample of importance sampling best."),
         c("scenario", ColumnKind::Name, "", "Recorded scenario of the kernel; null where the density has none."),
         c("source", ColumnKind::Name, "", "What the sample was drawn from: density, or proposal; each counts its samples from 0."),
-        c("weight", ColumnKind::Binary64, "1", "What a failing lane adds to P: the weights of all failing lanes of a model, headway and criterion add up to it. Null in the table of every lane, where all samples count the same."),
+        c("weight", ColumnKind::Binary64, "1", "What a failing lane adds to P: the weights of all failing lanes of a model, headway and criterion add up to it (`auto`: to that of `mc`). Null in the table of every lane, where all samples count the same."),
     ]);
     columns.extend(density.space.parameters().iter().map(|parameter| {
         let (name, unit) = (parameter.name.clone(), parameter.unit.clone());
