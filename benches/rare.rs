@@ -7,7 +7,8 @@
 //! cargo bench --bench rare -- crude 1e8 cut-in        # crude lanes: failures, and by kernel the shares of the largest
 //! ```
 //!
-//! LANESWEEP_HALF_WIDTH (0.1) and LANESWEEP_CRUDE (1e8, draws of the density) change what is asked for.
+//! LANESWEEP_HALF_WIDTH (0.1) and LANESWEEP_CRUDE (1e8, draws of the density) change what is asked for;
+//! LANESWEEP_ASSURANCE=search is `--assurance search`.
 
 #[allow(dead_code)] // some of it is for tests only
 #[path = "../tests/common/reliability.rs"]
@@ -111,10 +112,12 @@ fn setting(name: &str, default: f64) -> f64 {
 }
 
 fn estimate(density: &dyn Density, limit_state: &dyn LimitState, seed: u64) -> (Vec<Estimate>, SearchRun) {
-    let crude = setting("LANESWEEP_CRUDE", 1e8) as u64;
+    let is_bounded = std::env::var("LANESWEEP_ASSURANCE").is_err();
+    // Of a search alone as many as `sample` draws.
+    let crude = setting("LANESWEEP_CRUDE", if is_bounded { 1e8 } else { 20_000.0 }) as u64;
     let half_width = setting("LANESWEEP_HALF_WIDTH", 0.1);
-    let goal = Goal { half_width, max_draws: 10_000_000, max_crude: crude };
-    let search = Search { crude, ..Search::default() };
+    let goal = Goal { half_width, max_draws: 10_000_000, max_crude: if is_bounded { crude } else { 0 } };
+    let search = Search { crude, is_bounded, ..Search::default() };
     adaptive(density, limit_state, &search, &goal, seed, 0.95).expect("an estimate")
 }
 

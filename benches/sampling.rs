@@ -57,11 +57,11 @@ fn run(part: &str, density: &DensityModel, models: &[ModelId], samples: u64) {
     let backend = CpuBackend::lane_arithmetic();
     let executor = Executor::new(&backend);
     let start = Instant::now();
-    let run = sample.run(&executor).unwrap().crude.unwrap();
+    let tally = sample.run(&executor).unwrap().crude.unwrap();
     let seconds = start.elapsed().as_secs_f64();
     let id = density.space.id();
     let name = format!("{} {}", id.category.key(), id.key);
-    let (lanes, failures) = (sample.lane_count(), run.tally.failures.iter().sum::<u64>());
+    let (lanes, failures) = (sample.lane_count(), tally.failures.iter().sum::<u64>());
     let peak = peak_memory_bytes().unwrap_or(0);
     println!("{part},{name},{},{samples},{lanes},{seconds},{peak},{failures}", models.len());
     eprintln!(

@@ -6,11 +6,11 @@ use super::configured::Configured;
 use super::sample::{Sample, guard, only_crude};
 use super::signals::CANCEL;
 use super::{COMMIT, Exit, Output};
-use lanesweep_engine::{Chunk, CpuBackend, Executor, LanePlan, OpenBackend};
+use lanesweep_engine::{Chunk, CpuBackend, Executor, LanePlan, OpenBackend, SampleTally};
 use lanesweep_report::host::Host;
 use lanesweep_report::lanes;
 use lanesweep_run::parts::{EachChunk, Job, PLAN_FILE};
-use lanesweep_run::sampling::{self, FailingLane, SampleKind, SampleOptions, SampleResult};
+use lanesweep_run::sampling::{self, SampleKind, SampleOptions, SampleResult};
 use lanesweep_stats::density::read_density;
 use lanesweep_stats::estimate::{Search, StopRule};
 use lanesweep_support::atomic_file::StagedFile;
@@ -178,11 +178,12 @@ pub(super) fn list_failures(
 ) -> Result<StagedFile> {
     let cpu = CpuBackend::lane_arithmetic();
     let executor = Executor::new(&cpu).with_cancel(CANCEL.clone());
-    let samples = result.crude.as_ref().map_or(sample.unit_count(), |run| run.tally.samples());
+    let samples = result.crude.as_ref().map_or(sample.unit_count(), SampleTally::samples);
     configured.with_progress(samples, "failing lanes", &executor, |executor| {
         let limit = configured.settings.sample.failures_limit;
-        let each = &mut |lane: &FailingLane| lanes::write_failing_lane(&mut table, sample, lane);
-        sample.failing_lanes(result, limit, executor, each)
+        sample.failing_lanes(result, limit, executor, &mut |drawn, headway, model, outcome| {
+            lanes::write_sampled_lane(&mut table, sample, drawn, (headway, model), outcome)
+        })
     })?;
     table.stage()
 }

@@ -8,7 +8,7 @@ use crate::records::{at_contact, smallest_gap_m, time_s};
 use lanesweep_engine::{Chunk, Headway, LanePlan, Outcome, Trace};
 use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::ModelId;
-use lanesweep_run::sampling::{FailingLane, Origin, Sample};
+use lanesweep_run::sampling::{Sample, SampledPoint};
 use lanesweep_run::study::{Study, robust_lanes};
 use lanesweep_stats::density::DensityModel;
 use lanesweep_support::files::make_folder_of;
@@ -29,7 +29,7 @@ pub fn study_table(path: &Path, study: &Study) -> Result<TableWriter> {
     TableWriter::create(path, table_format(path, "rows")?, columns(value), &metadata)
 }
 
-/// A table for lanes of a sampling run; see [`write_sampled_chunk`] and [`write_failing_lane`].
+/// A table for lanes of a sampling run; see [`write_sampled_chunk`] and [`write_sampled_lane`].
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Usage`] for an unknown ending of the name.
@@ -184,9 +184,10 @@ fn sampled_columns(density: &DensityModel) -> Vec<Column> {
     ];
     columns.extend(outcome_columns(ColumnKind::Binary32));
     columns.extend([
-        c("kernel", ColumnKind::Whole, "1", "Kernel of the sample, from 0: the one that it was drawn from, or that explains a draw of a proposal best."),
+        c("kernel", ColumnKind::Whole, "1", "Kernel of the sample, from 0: the one that it was drawn from, or that explains a sample of importance sampling best."),
         c("scenario", ColumnKind::Name, "", "Recorded scenario of the kernel; null where the density has none."),
-        c("weight", ColumnKind::Binary64, "1", "Weight of the lane in P, if it fails: P is the sum over the draws. With importance sampling the draws of the density beside are not listed; their part is `crude_fraction`."),
+        c("source", ColumnKind::Name, "", "What the sample was drawn from: density, or proposal; each counts its samples from 0."),
+        c("weight", ColumnKind::Binary64, "1", "What a failing lane adds to P: the weights of all failing lanes of a model, headway and criterion add up to it (`auto`: to that of `mc`). Null in the table of every lane, where all samples count the same."),
     ]);
     columns.extend(density.space.parameters().iter().map(|parameter| {
         let (name, unit) = (parameter.name.clone(), parameter.unit.clone());
@@ -210,46 +211,45 @@ pub fn write_sampled_chunk(table: &mut TableWriter, sample: &Sample, plan: &Lane
         if drawn.is_void() {
             continue;
         }
-        let origin = Origin { kernel: generator.points.component(unit, drawn.tries), weight: 1.0 };
-        let point: Vec<f64> = drawn.values[..dimensions].iter().map(|&v| f64::from(v)).collect();
+        let drawn = SampledPoint {
+            sample: unit,
+            point: drawn.values[..dimensions].iter().map(|&v| f64::from(v)).collect(),
+            is_of_density: true,
+            kernel: generator.points.component(unit, drawn.tries),
+            weight: None,
+        };
         for (at, outcome) in lanes.iter().enumerate() {
-            let lane = (unit, at / models, plan.models[at % models]);
-            table.row(&sampled_row(sample, lane, &point, outcome, origin))?;
+            write_sampled_lane(table, sample, &drawn, (at / models, plan.models[at % models]), outcome)?;
         }
     }
     Ok(())
 }
 
-/// Writes a failing lane, as [`write_sampled_chunk`].
+/// Writes a lane of a sample, with the index of its headway, as [`write_sampled_chunk`].
 ///
 /// # Errors
 /// As [`TableWriter::row`].
-pub fn write_failing_lane(table: &mut TableWriter, sample: &Sample, lane: &FailingLane) -> Result<()> {
-    let of = (lane.sample, lane.headway, lane.model);
-    table.row(&sampled_row(sample, of, &lane.point, &lane.outcome, lane.origin))
-}
-
-/// A row of [`sampled_columns`].
-fn sampled_row<'a>(
-    sample: &'a Sample,
-    (index, headway, model): (u64, usize, ModelId),
-    point: &[f64],
+pub fn write_sampled_lane(
+    table: &mut TableWriter,
+    sample: &Sample,
+    drawn: &SampledPoint,
+    (headway, model): (usize, ModelId),
     outcome: &Outcome<f64>,
-    origin: Origin,
-) -> Vec<Cell<'a>> {
+) -> Result<()> {
     let id = sample.density.space.id();
-    let scenario = origin.kernel.and_then(|kernel| sample.density.scenarios.get(kernel as usize));
+    let scenario = drawn.kernel.and_then(|kernel| sample.density.scenarios.get(kernel as usize));
     let mut row = vec![
-        Cell::Whole(index as i64),
+        Cell::Whole(drawn.sample as i64),
         Cell::text(id.category.key()),
         Cell::text(id.key),
         Cell::text(sample.options.headway_name(headway)),
         Cell::text(model.name()),
     ];
     row.extend(outcome_cells(outcome, sample.profile.frame.dt_s));
-    row.push(origin.kernel.map_or(Cell::Null, |kernel| Cell::Whole(i64::from(kernel))));
+    row.push(drawn.kernel.map_or(Cell::Null, |kernel| Cell::Whole(i64::from(kernel))));
     row.push(scenario.map_or(Cell::Null, |scenario| Cell::text(scenario.id.as_str())));
-    row.push(Cell::Number(origin.weight));
-    row.extend(point.iter().map(|&v| Cell::Number(v)));
-    row
+    row.push(Cell::text(if drawn.is_of_density { "density" } else { "proposal" }));
+    row.push(Cell::number(drawn.weight));
+    row.extend(drawn.point.iter().map(|&v| Cell::Number(v)));
+    table.row(&row)
 }

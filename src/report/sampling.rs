@@ -33,9 +33,7 @@ impl<'a> SampleReport<'a> {
     /// [`lanesweep_support::Error::Io`].
     pub fn write(&self, mut results: Results) -> Result<ResultFiles> {
         let density = &self.sample.density;
-        if let Some(run) = &self.result.crude {
-            results.add_table("tables/convergence.csv", convergence_table(&run.convergence))?;
-        }
+        results.add_table("tables/convergence.csv", convergence_table(&self.result.convergence))?;
         if let Some(proposal) = &self.result.proposal {
             results.add("proposal.json", proposal_text(density, proposal)?.as_bytes())?;
         }
@@ -61,7 +59,7 @@ impl<'a> SampleReport<'a> {
 
     /// Draws of crude Monte Carlo and their plan.
     pub(super) fn drawn(&self) -> Option<(&'a SampleTally, &'a LanePlan)> {
-        self.result.crude.as_ref().map(|crude| &crude.tally).zip(self.sample.lane_plan())
+        self.result.crude.as_ref().zip(self.sample.lane_plan())
     }
 
     /// `estimate.json`; `files` are in the same folder.

@@ -98,6 +98,7 @@ pub(super) fn convergence_table(checkpoints: &[Checkpoint]) -> Table {
         .column("samples", |(samples, _)| samples)
         .column("model", |(_, row)| row.model.name())
         .column("criterion", |(_, row)| row.criterion.key())
+        .column("headway", |(_, row)| row.headway.as_str())
         .column("probability", |(_, row)| row.probability)
         .column("low", |(_, row)| row.interval[0])
         .column("high", |(_, row)| row.interval[1])

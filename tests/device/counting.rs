@@ -16,7 +16,7 @@ fn tally(
 ) -> Result<SampleTally> {
     let sample = Sample::plan(density.clone(), &Profile::load("paper").unwrap(), options)?;
     let executor = Executor { chunk_lanes, ..Executor::new(backend).with_recheck(1) };
-    Ok(sample.run(&executor)?.crude.unwrap().tally)
+    Ok(sample.run(&executor)?.crude.unwrap())
 }
 
 #[test]

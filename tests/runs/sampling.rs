@@ -25,16 +25,17 @@ fn furnished() -> Folder {
     dir
 }
 
-/// The first `limit` failing rows of each model and criterion, as lines of the table.
+/// The first `limit` failing rows of each model and criterion, as lines of the table, without the weights: those are known after
+/// the last row.
 fn first_failing(table: &str, limit: usize) -> String {
     let mut lines = table.lines();
     let header: Vec<&str> = lines.next().unwrap().split(',').collect();
     let at = |name: &str| header.iter().position(|column| *column == name).unwrap();
-    let (model, criteria) = (at("model"), ["collision", "ttc", "btn"].map(at));
+    let (model, weight, criteria) = (at("model"), at("weight"), ["collision", "ttc", "btn"].map(at));
     let mut found = std::collections::HashMap::new();
-    let mut chosen = header.join(",") + "\n";
+    let mut chosen = String::new();
     for line in lines {
-        let cells: Vec<&str> = line.split(',').collect();
+        let mut cells: Vec<&str> = line.split(',').collect();
         let mut is_first = false;
         for criterion in criteria.into_iter().filter(|criterion| cells[*criterion] == "1") {
             let count = found.entry((cells[model].to_owned(), criterion)).or_insert(0);
@@ -42,7 +43,8 @@ fn first_failing(table: &str, limit: usize) -> String {
             is_first |= *count <= limit;
         }
         if is_first {
-            chosen += &format!("{line}\n");
+            cells.remove(weight);
+            chosen += &(cells.join(",") + "\n");
         }
     }
     chosen
@@ -68,15 +70,16 @@ fn a_run_in_parts_is_the_run_in_one_and_its_failing_lanes_are_the_first_of_all_r
     let rows = read("rows.csv");
     assert_eq!(rows.lines().count(), 1 + 20_000 * 2 * MODELS);
     let (all, seven) = (first_failing(&rows, 1000), first_failing(&rows, 7));
-    assert!(all.lines().count() > 1001 && (8..=1 + 7 * 3 * MODELS).contains(&seven.lines().count()));
-    assert!(read("first.csv") == all && read("joined.csv") == all, "the first thousand");
-    assert!(read("seven.csv") == seven && read("counted.csv") == seven, "the first seven");
+    assert!(all.lines().count() > 1000 && (7..=7 * 3 * MODELS).contains(&seven.lines().count()));
+    let listed = |path: &str| first_failing(&read(path), usize::MAX);
+    assert!(listed("first.csv") == all && read("joined.csv") == read("first.csv"), "the first thousand");
+    assert!(listed("seven.csv") == seven && read("counted.csv") == read("seven.csv"), "the first seven");
     let of = density(Category::CutIn, "2");
     // A row says how to run its lane again, and it is the same lane.
     for row in table(&dir.join("seven.csv")).iter().step_by(9) {
         let key = format!("#{}/{}/{}/{}", row["sample"], row["variant"], row["headway"], row["model"]);
         let kernel: usize = row["kernel"].parse().unwrap();
-        assert_eq!((&*row["scenario"], &*row["weight"]), (&*of.scenarios[kernel].id, "1"), "{key}");
+        assert_eq!((&*row["scenario"], &*row["source"]), (&*of.scenarios[kernel].id, "density"), "{key}");
         // It lies around its kernel.
         for ((parameter, middle), spread) in
             of.space.parameters().iter().zip(&of.kde.points()[kernel]).zip(of.kde.spread())
@@ -149,6 +152,16 @@ fn a_searched_proposal_can_be_sampled_again_and_in_shards_with_its_failing_draws
     let searched = |shard| ran(dir, &format!("{base} --estimator is --out searched --shard {shard}"));
     let _ = ["1/2", "0/2"].map(searched);
     assert_eq!(merged("searched"), estimates(dir, "is"));
+    // The estimate after growing numbers of draws of the proposal, the same from shards; the last is that of all.
+    let course = |folder: &str| table(&dir.join(folder).join("tables/convergence.csv"));
+    assert_eq!(course("searched"), course("is"));
+    let (all, course) = (table(&dir.join("is/estimates.csv")).remove(0), course("is"));
+    assert!(course.len() > 6 && course[0]["samples"] == "64" && course[1]["samples"] == "128", "{course:?}");
+    for (column, of_all) in
+        [("headway", "headway"), ("probability", "probability"), ("low", "draws_low"), ("high", "draws_high")]
+    {
+        assert_eq!(course.last().unwrap()[column], all[of_all], "{column}");
+    }
     let given = format!("{base} --estimator is --proposal is/proposal.json --samples 20000");
     ran(dir, &format!("{given} --out again --failures again.csv"));
     let _ = ["1/2", "0/2"].map(|shard| ran(dir, &format!("{given} --out given --shard {shard}")));
@@ -157,12 +170,7 @@ fn a_searched_proposal_can_be_sampled_again_and_in_shards_with_its_failing_draws
         let rows = table(&dir.join(whole));
         assert!(rows == table(&dir.join(parts)), "{whole}");
         assert!(rows.len() == 1000 && rows.iter().all(|row| row["collision"] == "1"), "{whole}: {}", rows.len());
-        // At least one draw of the density belongs to each of the proposal.
-        let weight = |row: &BTreeMap<String, String>| row["weight"].parse::<f64>().unwrap();
-        assert!(
-            rows.iter().all(|row| weight(row) > 0.0 && weight(row) <= 1.0 && !row["scenario"].is_empty()),
-            "{whole}"
-        );
+        assert!(rows.iter().all(|row| !row["scenario"].is_empty()), "{whole}");
     }
     let estimate = |folder: &str| json(&dir.join(folder).join("estimate.json"))["estimates"][0]["estimate"].clone();
     let truth = estimate("mc")["probability"].as_f64().unwrap();
@@ -171,6 +179,30 @@ fn a_searched_proposal_can_be_sampled_again_and_in_shards_with_its_failing_draws
         let p = found["probability"].as_f64().unwrap();
         let error = found["coefficient_of_variation"].as_f64().unwrap();
         assert!((p / truth - 1.0).abs() < 5.0 * error + 0.05, "{folder}: {p} beside {truth}");
+    }
+}
+
+#[test]
+fn the_weights_of_all_failing_lanes_add_up_to_p_and_those_of_the_density_to_its_part() {
+    let dir = &*furnished();
+    for (out, how) in [("mc", "--samples 4000"), ("is", "--estimator is --half-width 0.3")] {
+        let base = "-q sample density.json --thw 0.8,0.4 --models FSM,RSS --config sample.failures_limit=1000000";
+        ran(dir, &format!("{base} {how} --failures {out}.csv --out {out} --backend cpu"));
+        let rows = table(&dir.join(out).with_extension("csv"));
+        let number = |row: &BTreeMap<String, String>, column: &str| row[column].parse::<f64>().unwrap();
+        for estimate in table(&dir.join(out).join("estimates.csv")).iter().filter(|row| row["headway"] != "all") {
+            let is_same =
+                |row: &BTreeMap<String, String>| ["headway", "model"].iter().all(|of| row[*of] == estimate[*of]);
+            let failing = rows.iter().filter(|row| is_same(row) && row[&estimate["criterion"]] == "1");
+            let (mut p, mut of_density) = (0.0, 0.0);
+            for row in failing {
+                p += number(row, "weight");
+                of_density += if row["source"] == "density" { number(row, "weight") } else { 0.0 };
+            }
+            assert!((p / number(estimate, "probability") - 1.0).abs() < 1e-9, "{p}: {estimate:?}");
+            let fraction = if out == "is" { number(estimate, "crude_fraction") } else { 1.0 };
+            assert!(fraction > 0.0 && (of_density / p - fraction).abs() < 1e-9, "{of_density}: {estimate:?}");
+        }
     }
 }
 

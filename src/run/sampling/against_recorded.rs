@@ -88,7 +88,7 @@ impl Sample {
             result.rows.iter_mut().for_each(|row| row.estimate.trust.warn_if(true, Warning::NotCompared));
             return Ok(result);
         };
-        let sampled = result.crude.as_ref().and_then(|crude| crude.tally.by_kernel.as_ref());
+        let sampled = result.crude.as_ref().and_then(|tally| tally.by_kernel.as_ref());
         for row in &mut result.rows {
             let cells = cells_of(row, &options.models, &headways);
             let (runs, failures) = recorded.over(&cells);

@@ -1,7 +1,8 @@
 //! Result of a sampling run of any estimator.
 
-use super::crude::CrudeRun;
+use super::convergence::Checkpoint;
 use super::estimate_rows::EstimateRow;
+use lanesweep_engine::SampleTally;
 use lanesweep_model::criterion::Criterion;
 use lanesweep_stats::density::Mixture;
 use lanesweep_stats::estimate::SearchRound;
@@ -11,8 +12,10 @@ use lanesweep_stats::estimate::SearchRound;
 pub struct SampleResult {
     /// The estimates.
     pub rows: Vec<EstimateRow>,
-    /// Counts and convergence of crude Monte Carlo.
-    pub crude: Option<CrudeRun>,
+    /// Counts of crude Monte Carlo.
+    pub crude: Option<SampleTally>,
+    /// Estimates at the checkpoints.
+    pub convergence: Vec<Checkpoint>,
     /// The rounds of the search.
     pub search: Vec<SearchRound>,
     /// The proposal found.

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::crude::{checkpoints, crude_of_segments, sample_into};
+use super::crude::sample_into;
 use super::estimate_rows::crude_rows;
 use super::plan_file::SEARCH_FILE;
 use super::result::SampleResult;
@@ -16,6 +16,12 @@ use lanesweep_engine::{Executor, SampleTally, SweepSummary};
 use lanesweep_stats::density::Exposure;
 use lanesweep_support::files::remove_file;
 use lanesweep_support::{Error, Place, Result};
+
+/// Samples at the first checkpoint of crude Monte Carlo; each further one has twice as many. Few evaluations, so repeated testing
+/// affects the interval of a stop rule little, and neither the speed of a machine nor its number of threads changes the end.
+const FIRST_CRUDE: u64 = 4096;
+/// Draws of a proposal at the first checkpoint of importance sampling, which stops at none.
+const FIRST_WEIGHTED: u64 = 64;
 
 /// Record of a sampling run.
 pub const ESTIMATE_RECORD: &str = "estimate.json";
@@ -115,7 +121,9 @@ impl Job for Sample {
     }
 
     fn cuts(&self) -> Vec<u64> {
-        if matches!(self.kind, SampleKind::Crude(_)) { checkpoints(self.samples()) } else { Vec::new() }
+        let first = if matches!(self.kind, SampleKind::Crude(_)) { FIRST_CRUDE } else { FIRST_WEIGHTED };
+        let doubled = std::iter::successors(Some(first), |at| at.checked_mul(2));
+        doubled.take_while(|at| *at < self.samples()).chain([self.samples()]).collect()
     }
 
     fn compute(
@@ -144,24 +152,21 @@ impl Job for Sample {
     }
 
     fn result(&self, counts: Vec<SampleCounts>, computed: Computed, place: Place) -> Result<SampleResult> {
+        let (counts, convergence) = self.converged(counts)?;
         let result = match &self.kind {
             SampleKind::Crude(plan) => {
-                let tallies = counts.into_iter().filter_map(SampleCounts::crude).collect();
-                let run = crude_of_segments(self, plan, tallies)?;
-                if self.options.stop.is_fixed() && run.tally.samples() != self.unit_count() {
+                let tally = counts.and_then(SampleCounts::crude).unwrap_or_else(|| SampleTally::empty(plan));
+                if self.options.stop.is_fixed() && tally.samples() != self.unit_count() {
                     let problem = "the parts do not hold every sample that their names stand for";
                     return Err(Error::input(place, problem, "make them again"));
                 }
-                let rows = crude_rows(self, plan, &run.tally, computed.stopped);
+                let rows = crude_rows(self, plan, &tally, computed.stopped);
                 let rechecked_lanes = computed.summary.rechecked_lanes;
-                SampleResult { rows, rechecked_lanes, crude: Some(run), ..SampleResult::default() }
+                SampleResult { rows, rechecked_lanes, crude: Some(tally), ..SampleResult::default() }
             }
-            SampleKind::Weighted(weighted) => {
-                let tally = counts.into_iter().map(Ok).reduce(|all, next| all?.join(next?)).transpose()?;
-                self.weighted_result(weighted, tally, place)?
-            }
+            SampleKind::Weighted(weighted) => self.weighted_result(weighted, counts, place)?,
             SampleKind::Search(_) => return Err(not_searched()),
         };
-        self.against_recorded(SampleResult { parts: computed.parts, ..result })
+        self.against_recorded(SampleResult { parts: computed.parts, convergence, ..result })
     }
 }

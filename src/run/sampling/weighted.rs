@@ -14,7 +14,7 @@ use super::{Sample, Weighted};
 use crate::parts::{Ledger, MergeableCounts};
 use lanesweep_engine::{CpuBackend, Executor, lanes_within_seconds};
 use lanesweep_stats::estimate::{
-    BlockSums, Estimate, Found, Importance, Search, Warning, WeightSums, from_weight_sums, importance_sums, search,
+    BlockSums, Found, Importance, KernelShares, Search, Warning, WeightSums, from_weight_sums, importance_sums, search,
 };
 use lanesweep_support::cancel::Cancel;
 use lanesweep_support::{Error, Place, Result};
@@ -106,6 +106,16 @@ impl Sample {
         Ok(())
     }
 
+    /// The estimates from sums, with the intervals of the draws.
+    pub(super) fn weighted_rows(&self, tally: &WeightedTally) -> Vec<EstimateRow> {
+        let of = |(question, sums): &(Question, BlockSums<WeightSums>)| {
+            let estimate = from_weight_sums(&sums.total().unwrap_or_default(), self.options.level);
+            let headway = self.options.headway_name(question.headway);
+            EstimateRow::of_draws(question.model, question.criterion, headway, estimate, self.exposure())
+        };
+        tally.sums.iter().map(of).collect()
+    }
+
     /// The estimates from the sums over all samples.
     ///
     /// # Errors
@@ -116,7 +126,7 @@ impl Sample {
         counts: Option<SampleCounts>,
         place: Place,
     ) -> Result<SampleResult> {
-        let (options, exposure) = (&self.options, self.exposure());
+        let options = &self.options;
         let counts = counts.filter(|counts| counts.covered().first() == Some(&(0..self.samples())));
         let Some(SampleCounts::Weighted(tally)) = counts else {
             return Err(Error::input(place, "the parts do not hold every sample", "make them again"));
@@ -124,28 +134,21 @@ impl Sample {
         // Some more lanes, on the CPU: a merge has no other backend, and all backends give the same bits.
         let cpu = CpuBackend::lane_arithmetic();
         let lanes = self.limit_state(Executor::new(&cpu));
-        let estimates: Vec<Estimate> = tally
-            .sums
-            .iter()
-            .map(|(_, sums)| from_weight_sums(&sums.total().unwrap_or_default(), options.level))
-            .collect();
+        let mut rows = self.weighted_rows(&tally);
         // Enough for a scenario that carries a fifth of the rarest failures to be among them.
-        let rarest = estimates.iter().map(|of| of.probability).filter(|p| *p > 0.0).fold(f64::INFINITY, f64::min);
+        let found = rows.iter().map(|row| row.estimate.probability).filter(|p| *p > 0.0);
+        let rarest = found.fold(f64::INFINITY, f64::min);
         let crude =
             ((Search::CRUDE_FAILURES / rarest) as u64).min(weighted.draws.draws * weighted.draws.crude_per_draw);
         let shares = scenario_shares(&lanes, &weighted.proposal, (options.seed, crude))?;
-        let mut rows = Vec::new();
         let searched = weighted.search.as_ref().map_or(0, |search| search.points);
-        for (((question, _), estimate), shares) in tally.sums.iter().zip(estimates).zip(&shares) {
-            let mut estimate = estimate.after_search(searched);
-            estimate.trust.warn_if(weighted.draws.crude_per_draw == 0, Warning::NotBounded);
-            let headway = options.headway_name(question.headway);
-            let with = shares
-                .as_ref()
-                .map(|of| (estimate.clone().over_kernels(of), of.effective_failing, of.carriers.clone()));
-            let row = EstimateRow::of_draws(question.model, question.criterion, headway, estimate, exposure);
-            rows.push(row.with_data(with, exposure));
-        }
+        let with_shares = |(mut row, shares): (EstimateRow, Option<KernelShares>)| {
+            row.estimate = row.estimate.after_search(searched);
+            row.estimate.trust.warn_if(weighted.draws.crude_per_draw == 0, Warning::NotBounded);
+            let with = shares.map(|of| (row.estimate.clone().over_kernels(&of), of.effective_failing, of.carriers));
+            row.with_data(with, self.exposure())
+        };
+        rows = rows.into_iter().zip(shares).map(with_shares).collect();
         let proposal = weighted.search.as_ref().and_then(|search| search.proposal.clone());
         let search = weighted.search.as_ref().map(|search| search.rounds.clone()).unwrap_or_default();
         Ok(SampleResult { rows, proposal, search, ..SampleResult::default() })

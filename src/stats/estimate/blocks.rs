@@ -2,9 +2,8 @@
 //!
 //! Floating-point addition is not associative, so the order of all additions is fixed. They follow the binary tree over
 //! the indices, in which a node of level l covers 2^l indices from a multiple of 2^l on. Any range of indices is stored
-//! as the largest nodes that fill it, at most two per level; ranges join wherever they complete a node. A block of
-//! [`BLOCK`] indices is a node of level 12. Memory grows with the logarithm of the range and with the number of its
-//! gaps.
+//! as the largest nodes that fill it, at most two per level; ranges join wherever they complete a node. Memory grows with
+//! the logarithm of the range and with the number of its gaps.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -12,9 +11,6 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use lanesweep_support::{Error, Place, Result};
-
-/// Indices in a block. Ranges that start and end at multiples of it join fastest.
-pub(crate) const BLOCK: u64 = 4096;
 
 /// Sums that can be joined: `left` covers the indices just before `right`.
 pub trait Join: Default {

@@ -40,33 +40,35 @@ impl Importance {
         Importance { draws, crude_per_draw: crude.div_ceil(draws.max(1)).max(least), ..self }
     }
 
-    /// The weights 1/(m + g/f) of failing draws of the density f or of the proposal g, with m draws of f for each of g.
-    pub fn weights(&self, nominal: &dyn Density, proposal: &Mixture, points: &[&[f64]]) -> Vec<f64> {
-        let validity = nominal.validity_fraction();
-        // An index of the density whose attempts are all invalid is a draw that does not fail.
-        let is_drawn = 1.0 - (1.0 - validity).powi(ATTEMPTS as i32);
-        let logs = proposal.log_densities(points).into_iter().zip(nominal.log_densities(points));
-        let weight = |(g, f): (f64, f64)| 1.0 / (self.crude_per_draw as f64 * is_drawn + libm::exp(g - f) * validity);
-        logs.map(weight).collect()
-    }
-
-    /// The draw of the proposal of this index; `None` for an invalid one.
-    pub fn draw(&self, nominal: &dyn Density, proposal: &Mixture, index: u64) -> Option<Vec<f64>> {
-        let stream = Stream { seed: self.seed, purpose: purpose::PROPOSAL };
-        Some(proposal.draw(&stream, index, 0)).filter(|point| nominal.is_valid(point))
+    /// The failures among a range of draws of the proposal, and then among the draws of the density that belong to them.
+    ///
+    /// # Errors
+    /// Those of the limit state.
+    pub fn failures(
+        &self,
+        nominal: &dyn Density,
+        proposal: &Mixture,
+        limit_state: &dyn LimitState,
+        range: Range<u64>,
+    ) -> Result<Vec<WeightedFailure>> {
+        let purposes = [purpose::PROPOSAL, purpose::BESIDE_PROPOSAL];
+        weighted_failures(nominal, proposal, limit_state, self, purposes, range)
     }
 }
 
 /// A failing draw of the proposal or of the density.
-pub(super) struct WeightedFailure {
+pub struct WeightedFailure {
+    /// Its index among the draws of the same kind, its point, and what it fails.
     pub of: Failure,
+    /// Whether it is a draw of the density.
     pub is_crude: bool,
+    /// The draw of the proposal that it is or belongs to.
+    pub draw: u64,
     /// 1/(m + g/f).
     pub weight: f64,
 }
 
-/// The failures among a range of draws of the proposal, and then among the draws of the density that belong to them, with the
-/// index of the draw of the proposal. The purposes are those of the draws of both.
+/// As [`Importance::failures`], with the purposes of the draws of the proposal and of the density.
 pub(super) fn weighted_failures(
     nominal: &dyn Density,
     proposal: &Mixture,
@@ -84,14 +86,21 @@ pub(super) fn weighted_failures(
         failing(limit_state, indices, points)?.into_iter().map(|of| (false, of)).collect();
     if crude > 0 {
         let found = limit_state.failures(nominal, of_density, range.start * crude..range.end * crude)?;
-        failures.extend(found.into_iter().map(|of| (true, Failure { index: of.index / crude, ..of })));
+        failures.extend(found.into_iter().map(|of| (true, of)));
     }
+    let validity = nominal.validity_fraction();
+    // An index of the density whose attempts are all invalid is a draw that does not fail.
+    let beside = crude as f64 * (1.0 - (1.0 - validity).powi(ATTEMPTS as i32));
     let of_chunk = |chunk: &[(bool, Failure)]| {
         let points: Vec<&[f64]> = chunk.iter().map(|(_, of)| of.point.as_slice()).collect();
-        options.weights(nominal, proposal, &points)
+        let logs = proposal.log_densities(&points).into_iter().zip(nominal.log_densities(&points));
+        logs.map(|(g, f)| 1.0 / (beside + libm::exp(g - f) * validity)).collect::<Vec<f64>>()
     };
     let weights: Vec<f64> = failures.par_chunks(AT_ONCE).flat_map_iter(of_chunk).collect();
-    let weighted = |((is_crude, of), weight)| WeightedFailure { of, is_crude, weight };
+    let weighted = |((is_crude, of), weight): ((bool, Failure), f64)| {
+        let draw = if is_crude { of.index / crude } else { of.index };
+        WeightedFailure { of, is_crude, draw, weight }
+    };
     Ok(failures.into_iter().zip(weights).map(weighted).collect())
 }
 
@@ -107,15 +116,14 @@ pub fn importance_sums(
     options: &Importance,
     indices: Range<u64>,
 ) -> Result<Vec<BlockSums<WeightSums>>> {
-    let purposes = [purpose::PROPOSAL, purpose::BESIDE_PROPOSAL];
     let unfailed = WeightSums { draws: 1, crude: options.crude_per_draw, ..WeightSums::default() };
     let mut sums: Vec<BlockSums<WeightSums>> = vec![BlockSums::default(); limit_state.questions()];
     for batch in batches(indices) {
-        let failures = weighted_failures(nominal, proposal, limit_state, options, purposes, batch.clone())?;
+        let failures = options.failures(nominal, proposal, limit_state, batch.clone())?;
         for (question, sums) in sums.iter_mut().enumerate() {
             let mut leaves = vec![unfailed; (batch.end - batch.start) as usize];
             for failure in failures.iter().filter(|failure| failure.of.fails[question]) {
-                leaves[(failure.of.index - batch.start) as usize].add_failure(failure.weight, failure.is_crude);
+                leaves[(failure.draw - batch.start) as usize].add_failure(failure.weight, failure.is_crude);
             }
             sums.merge(BlockSums::of_leaves(batch.start, &leaves))?;
         }

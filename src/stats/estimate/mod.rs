@@ -23,14 +23,14 @@ mod weights;
 
 pub use blocks::{BlockSums, Join};
 pub use goal::Goal;
-pub use importance::{Importance, from_weight_sums, importance_of_points, importance_sums};
+pub use importance::{Importance, WeightedFailure, from_weight_sums, importance_of_points, importance_sums};
 pub use interval::{Interval, IntervalKind, wilson};
 pub use kernels::{Carrier, KernelShares, kernel_shares};
 pub use limit_state::{ATTEMPTS, Density, Failure, LimitState, Truncated};
 pub use monte_carlo::{Counts, from_clusters, from_counts};
 pub use ratio::{ClusterRate, Clusters, Ratio, RatioMethod, RatioVerdict, cluster_rate, paired_ratio};
 pub use search::{Found, Search, SearchRound, SearchRun, search};
-pub use stop::{StopReason, StopRule, next_checkpoint};
+pub use stop::{StopReason, StopRule};
 pub use summary::Estimate;
 pub use warnings::{Trust, Verdict, Warning};
 pub use weights::{WeightFigures, WeightSums};

@@ -5,14 +5,6 @@ use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::BLOCK;
-
-/// The first sample size after `samples` at which the rules are evaluated: 4,096 · 2^k. Few evaluations, so repeated
-/// testing affects the interval little.
-pub fn next_checkpoint(samples: u64) -> u64 {
-    BLOCK.saturating_mul((samples / BLOCK + 1).next_power_of_two())
-}
-
 /// When to end. A plan file stores only the number of samples, because the draws do not depend on the other rules.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct StopRule {
@@ -78,12 +70,6 @@ impl StopRule {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn checkpoints_are_functions_of_the_sample_size_only() {
-        assert_eq!([0, 4095, 4096, 8192, 16_384].map(next_checkpoint), [4096, 4096, 8192, 16_384, 32_768]);
-        assert!(next_checkpoint(1 << 63) > 1 << 63);
-    }
 
     #[test]
     fn a_narrow_interval_of_few_failures_does_not_end_a_sample() {
