@@ -82,17 +82,7 @@ class Frame:
 
 @disjoint_base
 class LimitState:
-    def __new__(
-        cls,
-        density: Any,
-        *,
-        model: str,
-        criterion: str,
-        thw: str | None,
-        profile: str,
-        backend: str,
-        device: str | None,
-    ) -> LimitState: ...
+    def __new__(cls, given: dict[str, Any]) -> LimitState: ...
     @property
     def parameters(self) -> list[str]: ...
     @property
@@ -124,18 +114,7 @@ def profile(name: str) -> dict[str, Any]: ...
 def frame_of_columns(columns: dict[str, Any]) -> Frame: ...
 def frame_of_stream(bytes: bytes) -> Frame: ...
 def simulate(
-    cases: Any,
-    *,
-    category: str | None,
-    models: list[str],
-    thw: list[str],
-    profile: str,
-    dt: float | None,
-    backend: str,
-    device: str | None,
-    reference: bool,
-    accept_implausible: bool,
-    on_message: Callable[[str, str], None] | None = None,
+    cases: Any, given: dict[str, Any], on_message: Callable[[str, str], None] | None = None
 ) -> tuple[Frame, list[str]]: ...
 def register(
     name: str,
