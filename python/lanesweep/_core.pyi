@@ -1,7 +1,6 @@
 """Types of the compiled module."""
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any, final
 from typing_extensions import disjoint_base
 
@@ -103,7 +102,7 @@ class LimitState:
 def run(
     function: str,
     call: str,
-    arguments: dict[str, bool | list[str | Path]],
+    arguments: dict[str, bool | list[str]],
     on_progress: Callable[[str, int, int | None], None] | None = None,
     on_message: Callable[[str, str], None] | None = None,
 ) -> tuple[int, str, str, list[tuple[str, Frame]]]: ...

@@ -9,7 +9,6 @@ from __future__ import annotations
 import copyreg
 import ctypes
 import dis
-import enum
 import functools
 import hashlib
 import importlib
@@ -63,9 +62,8 @@ class _Walk:
 
     def __init__(self) -> None:
         self.hash = hashlib.sha256()
-        self.seen: dict[int, int] = {}
-        # Identities of objects stay theirs while these live.
-        self.alive: list[Any] = []
+        # By identity, which stays an object's while it lives: its position, and the object.
+        self.seen: dict[int, tuple[int, Any]] = {}
 
     def say(self, *words: object) -> None:
         text = repr(words).encode("utf-8", "backslashreplace")
@@ -73,10 +71,9 @@ class _Walk:
 
     def is_first(self, value: Any) -> bool:
         if id(value) in self.seen:
-            self.say("again", self.seen[id(value)])
+            self.say("again", self.seen[id(value)][0])
             return False
-        self.seen[id(value)] = len(self.seen)
-        self.alive.append(value)
+        self.seen[id(value)] = len(self.seen), value
         return True
 
     def add(self, value: Any, where: str) -> None:
@@ -128,9 +125,6 @@ class _Walk:
         elif type(value) is np.ndarray and value.dtype.kind != "O":
             self.say("array", value.dtype.descr, value.shape)
             self.hash.update(np.ascontiguousarray(value).tobytes())
-        elif isinstance(value, enum.Enum):
-            self.say(value.name)
-            self.add(type(value), where)
         elif isinstance(value, CFuncPtr):
             self.say("function of C", getattr(value, "__name__", None))
             self.add(list((value._objects or {}).values()), where)

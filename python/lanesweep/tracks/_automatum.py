@@ -7,7 +7,7 @@ import math
 import polars as pl
 
 from ..options import Path as File
-from ._table import canonical, json_lists, json_vehicles
+from ._table import json_lists
 
 _NAMES = {
     "UUID": "vehicle_id",
@@ -41,5 +41,4 @@ def automatum(path: File) -> pl.DataFrame:
     polars.DataFrame
         ``vehicle_id, time_s, x_m, y_m, heading_deg, vx_mps, vy_mps, ax_mps2, ay_mps2, length_m, width_m, class, lane``.
     """
-    frame = canonical(path, json_lists(path, json_vehicles(path, "objects"), _NAMES))
-    return frame.with_columns(pl.col("heading_deg") * (180.0 / math.pi))
+    return json_lists(path, _NAMES, "objects").with_columns(pl.col("heading_deg") * (180.0 / math.pi))

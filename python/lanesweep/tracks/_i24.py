@@ -5,7 +5,7 @@ from __future__ import annotations
 import polars as pl
 
 from ..options import Path as File
-from ._table import bad, canonical, json_lists, json_vehicles
+from ._table import bad, json_lists
 
 _FOOT_M = 0.3048
 _CLASSES = {"0": "sedan", "1": "midsize", "2": "van", "3": "pickup", "4": "semi", "5": "truck", "6": "motorcycle"}
@@ -37,12 +37,7 @@ def i24(path: File) -> pl.DataFrame:
     polars.DataFrame
         ``vehicle_id, time_s, s_m, d_m, length_m, width_m, class, direction``, of the middle of the box.
     """
-    vehicles = json_vehicles(path)
-    for vehicle in vehicles:
-        # Exported from MongoDB.
-        if isinstance(vehicle.get("_id"), dict):
-            vehicle["_id"] = vehicle["_id"].get("$oid")
-    frame = canonical(path, json_lists(path, vehicles, _NAMES))
+    frame = json_lists(path, _NAMES)
     if not frame["direction"].is_in([1.0, -1.0]).fill_null(False).all():
         raise bad(path, "`direction`", "it is neither 1 nor -1", "check that this is I-24 MOTION")
     frame = frame.with_columns(pl.col("s_m", "d_m", "length_m", "width_m") * _FOOT_M, pl.col("class").str.strip_suffix(".0").replace(_CLASSES))

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import polars as pl
 
 from ..options import Path as File
-from ._table import COLUMNS, bad, canonical, json_lists, json_vehicles, number, read_table, unpacked
+from ._table import COLUMNS, bad, canonical, json_lists, number, read_table, unpacked
 
 _SWIFTRAJ = {
     "vehicle_id": "vehicle_id",
@@ -44,8 +44,8 @@ def lists(path: File, columns: Mapping[str, str]) -> pl.DataFrame:
     if unknown := set(columns.values()) - set(COLUMNS):
         raise bad(path, f"`{min(unknown)}`", f"it is no column of tracks; there are {', '.join(COLUMNS)}", "give one of these")
     if os.fspath(path).endswith(".parquet"):
-        return canonical(path, unpacked(path, read_table(path), columns))
-    return canonical(path, json_lists(path, json_vehicles(path), columns))
+        return unpacked(path, read_table(path), columns)
+    return json_lists(path, columns)
 
 
 def swiftraj(path: File, frame_interval_s: float = 0.1) -> pl.DataFrame:

@@ -6,7 +6,6 @@ import math
 import os
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
-from itertools import islice
 
 import polars as pl
 
@@ -128,9 +127,7 @@ def _types(files: File | Iterable[File]) -> dict[str, _Type]:
 def _samples(fcd: File) -> pl.DataFrame:
     """Vehicles and times, in our columns; classes are names of types, headings are SUMO's angles."""
     if os.fspath(fcd).removesuffix(".gz").endswith(".xml"):
-        rows, schema = _vehicles(fcd), dict.fromkeys(_NAMES, pl.String)
-        batches = iter(lambda: list(islice(rows, 100_000)), [])
-        frame = pl.concat([pl.DataFrame(schema=schema), *(pl.DataFrame(batch, schema, orient="row") for batch in batches)])
+        frame = pl.DataFrame(_vehicles(fcd), dict.fromkeys(_NAMES, pl.String), orient="row")
     else:
         frame = read_table(fcd)
         for tag in ("person", "container"):

@@ -91,9 +91,10 @@ def elements(path: File, *tags: str) -> Iterator[ET.Element]:
             raise bad(path, place, f"not well-formed XML, or truncated ({error})", "export the file again") from None
 
 
-def json_vehicles(path: File, key: str = "") -> list[dict[str, Any]]:
-    """Objects of a JSON list, of the list under a key, or one object per line; numbers stay texts."""
-    decoder = json.JSONDecoder(parse_float=str, parse_int=str, parse_constant=str)
+def _objects(path: File, key: str) -> list[dict[str, Any]]:
+    """Objects of a JSON list, of the list under a key, or one object per line; numbers stay texts, ids of MongoDB become texts."""
+    plain: dict[str, Any] = {"parse_float": str, "parse_int": str, "parse_constant": str}
+    decoder = json.JSONDecoder(**plain, object_hook=lambda found: found.get("$oid", found))
     found: list[dict[str, Any]] = []
     try:
         with opened(path) as file:
@@ -112,28 +113,9 @@ def json_vehicles(path: File, key: str = "") -> list[dict[str, Any]]:
     return found
 
 
-def unpacked(path: File, vehicles: pl.DataFrame, columns: Mapping[str, str], there: Iterable[str] = ()) -> pl.DataFrame:
-    """A row per item of the lists of the vehicles; `columns` has our names by theirs, which are among those that are `there`."""
-    for theirs in columns:
-        if theirs not in vehicles.columns:
-            problem = f"not there; the file has {', '.join(there or vehicles.columns)}"
-            raise bad(path, f"column `{theirs}`", problem, "check that it has this format")
-    frame = vehicles.select(pl.col(theirs).alias(ours) for theirs, ours in columns.items())
-    frame = frame.with_columns(pl.col(name).arr.to_list() for name, dtype in frame.schema.items() if isinstance(dtype, pl.Array))
-    packed = [name for name, dtype in frame.schema.items() if isinstance(dtype, pl.List)]
-    if not packed:
-        return frame
-    length = frame[packed[0]].list.len()
-    for name in packed[1:]:
-        differs = frame[name].list.len().ne_missing(length)
-        if differs.any():
-            problem = f"the lists of `{packed[0]}` and `{name}` differ in length"
-            raise bad(path, f"vehicle {differs.to_list().index(True) + 1} of the list", problem, "give lists of equal length")
-    return frame.filter(length > 0).explode(packed)
-
-
-def json_lists(path: File, vehicles: list[dict[str, Any]], columns: Mapping[str, str]) -> pl.DataFrame:
-    """The same of vehicles from JSON."""
+def json_lists(path: File, columns: Mapping[str, str], key: str = "") -> pl.DataFrame:
+    """A row per item of the lists of vehicles in JSON, which are in a list under a key, or one per line; `columns` as in `unpacked`."""
+    vehicles = _objects(path, key)
     frame, there = {}, dict.fromkeys(key for vehicle in vehicles for key in vehicle)
     for theirs in [of for of in columns if of in there or not vehicles]:
         cells = [vehicle.get(theirs) for vehicle in vehicles]
@@ -143,6 +125,25 @@ def json_lists(path: File, vehicles: list[dict[str, Any]], columns: Mapping[str,
                 raise bad(path, f"vehicle {number} of the list", f"`{theirs}` is {cell!r:.40}", "give every vehicle the same keys")
         frame[theirs] = pl.Series(theirs, cells, dtype=pl.List(pl.String) if packed else pl.String, strict=False)
     return unpacked(path, pl.DataFrame(frame), columns, there)
+
+
+def unpacked(path: File, vehicles: pl.DataFrame, columns: Mapping[str, str], there: Iterable[str] = ()) -> pl.DataFrame:
+    """A row per item of the lists of the vehicles; `columns` has our names by theirs, which are among those that are `there`."""
+    for theirs in columns:
+        if theirs not in vehicles.columns:
+            problem = f"not there; the file has {', '.join(there or vehicles.columns)}"
+            raise bad(path, f"column `{theirs}`", problem, "check that it has this format")
+    frame = vehicles.select(pl.col(theirs).alias(ours) for theirs, ours in columns.items())
+    frame = frame.with_columns(pl.col(name).arr.to_list() for name, dtype in frame.schema.items() if isinstance(dtype, pl.Array))
+    packed = [name for name, dtype in frame.schema.items() if isinstance(dtype, pl.List)]
+    for name in packed[1:]:
+        differs = frame[name].list.len().ne_missing(frame[packed[0]].list.len())
+        if differs.any():
+            problem = f"the lists of `{packed[0]}` and `{name}` differ in length"
+            raise bad(path, f"vehicle {differs.to_list().index(True) + 1} of the list", problem, "give lists of equal length")
+    if packed:
+        frame = frame.filter(pl.col(packed[0]).list.len() > 0).explode(packed)
+    return canonical(path, frame)
 
 
 def canonical(path: File, frame: pl.DataFrame) -> pl.DataFrame:
