@@ -25,9 +25,8 @@ def reproduce(train: Array, test: Array, weights: Array, size: int) -> Array:
     """The test vectors from `size` numbers each, by a network trained on others."""
     centre = train.mean(axis=0)
     x = (train - centre) * weights
-    hidden = (32, size, 32)
     network = MLPRegressor(
-        hidden_layer_sizes=hidden, activation="tanh", solver="lbfgs", alpha=1e-3, max_iter=1500, random_state=157
+        hidden_layer_sizes=(32, size, 32), activation="tanh", solver="lbfgs", alpha=1e-3, max_iter=1500, random_state=157
     )
     with warnings.catch_warnings():
         # The number of iterations is the early stopping.

@@ -45,12 +45,7 @@ class Unreadable(Exception):
 
 
 def digest(*values: Any) -> str:
-    """Return a digest of values, the first of which is the subject of an error.
-
-    Raises
-    ------
-    Unreadable
-    """
+    """Return a digest of values, the first of which is the subject of an `Unreadable` error."""
     walk = _Walk()
     for value in values:
         walk.add(value, "it")
@@ -109,14 +104,11 @@ class _Walk:
             self.say(type(value).__name__)
             for name in wrapped:
                 self.add(getattr(value, name), where)
-        elif type(value) in (list, tuple):
+        elif type(value) in (list, tuple, set, frozenset):
             self.say(type(value).__name__, len(value))
-            for at, item in enumerate(value):
+            is_ordered = type(value) in (list, tuple)
+            for at, item in enumerate(value if is_ordered else sorted(value, key=lambda item: (type(item).__name__, repr(item)))):
                 self.add(item, f"{where}[{at}]")
-        elif type(value) in (set, frozenset):
-            self.say("set", len(value))
-            for item in sorted(value, key=lambda item: (type(item).__name__, repr(item))):
-                self.add(item, f"an element of {where}")
         elif type(value) in (dict, types.MappingProxyType):
             self.say("dict", len(value))
             for key in sorted(value) if all(type(key) is str for key in value) else value:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import html
 import json
 import os
@@ -122,18 +123,15 @@ class Result:
         self._keep = keep
         self._json = document
         self._tables = dict(tables)
-        self._document: dict[str, Any] | None = None
 
     @property
     def folder(self) -> Path | None:
         return self.path if self.path is not None and self.path.is_dir() else None
 
-    @property
+    @functools.cached_property
     def document(self) -> dict[str, Any]:
-        if self._document is None:
-            found = json.loads(self._json or "{}", object_hook=_with_infinity)
-            self._document = found if isinstance(found, dict) else {"rows": found}
-        return self._document
+        found = json.loads(self._json or "{}", object_hook=_with_infinity)
+        return found if isinstance(found, dict) else {"rows": found}
 
     @property
     def densities(self) -> dict[str, Path]:

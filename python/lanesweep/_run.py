@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-import importlib
+import importlib.util
 import logging
 import numbers
 import os
@@ -22,14 +22,12 @@ from ._driver import names_of, refresh
 from ._result import Result, temporary
 
 _log = logging.getLogger("lanesweep")
-#: Code of a run that found nothing that it could use, each with its message.
-_NOTHING = 3
-_LEVELS = {"ERROR": logging.ERROR, "WARN": logging.WARNING, "INFO": logging.INFO, "DEBUG": logging.DEBUG, "TRACE": logging.DEBUG}
 
 
 def on_message(level: str, line: str) -> None:
     """Pass a line of the program's log on to `logging`, under the name ``lanesweep``."""
-    _log.log(_LEVELS.get(level, logging.INFO), "%s", line)
+    # Python has no level TRACE.
+    _log.log(getattr(logging, level, logging.DEBUG), "%s", line)
 
 
 def progress() -> tuple[Callable[[str, int, int | None], None] | None, Callable[[], None]]:
@@ -37,15 +35,13 @@ def progress() -> tuple[Callable[[str, int, int | None], None] | None, Callable[
 
     The bar is that of `tqdm` if it is installed; in a terminal or notebook only.
     """
-    try:
-        with warnings.catch_warnings():
-            # Without ipywidgets, tqdm draws its bar as text and warns about it.
-            warnings.simplefilter("ignore")
-            tqdm: Any = importlib.import_module("tqdm.auto").tqdm
-    except ImportError:
+    is_seen = (sys.stderr is not None and sys.stderr.isatty()) or "ipykernel" in sys.modules
+    if not is_seen or importlib.util.find_spec("tqdm") is None:
         return None, lambda: None
-    if not (sys.stderr is not None and sys.stderr.isatty()) and "ipykernel" not in sys.modules:
-        return None, lambda: None
+    with warnings.catch_warnings():
+        # Without ipywidgets, tqdm draws its bar as text and warns about it.
+        warnings.simplefilter("ignore")
+        tqdm: Any = importlib.import_module("tqdm.auto").tqdm
     bar: Any = None
 
     def move(what: str, done: int, total: int | None) -> None:
@@ -59,7 +55,7 @@ def progress() -> tuple[Callable[[str, int, int | None], None] | None, Callable[
         nonlocal bar
         if bar is not None:
             bar.close()
-            bar = None
+        bar = None
 
     return move, close
 
@@ -169,7 +165,7 @@ def _word(value: Any) -> str:
     return repr(value).removesuffix(".0") if isinstance(value, float) else str(value)
 
 
-def _words(value: Any) -> bool | list[str]:
+def words_of(value: Any) -> bool | list[str]:
     """Return the value of an argument as words of a command line."""
     if isinstance(value, dict):
         return [f"{name}={_word(one)}" for name, one in value.items()]
@@ -229,7 +225,7 @@ def run(function: str, arguments: Mapping[str, Any]) -> Result:
         on_message(level, line)
 
     move, close = progress()
-    words = {name: _words(value) for name, value in values.items()}
+    words = {name: words_of(value) for name, value in values.items()}
     refresh(word for several in words.values() if isinstance(several, list) for word in several)
     shown = ", ".join(f"{name}={value!r}" for name, value in values.items() if name != "out" and value is not False)
     call = os.fsencode(f"lanesweep.{function}({shown})").decode(errors="replace")
@@ -240,6 +236,6 @@ def run(function: str, arguments: Mapping[str, Any]) -> Result:
         raise
     finally:
         close()
-    if code == _NOTHING:
+    if code == 3:  # nothing that could be used, each with its message
         raise _core.InputError("\n".join(messages) or "there is nothing that can be read")
     return Result(function, code, _in_words(text), document, frames, messages, None if path is None else Path(path_of(path, "out")), keep)

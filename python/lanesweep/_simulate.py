@@ -16,7 +16,7 @@ import numpy.typing as npt
 from . import _core
 from ._core import Frame
 from ._driver import Driver, name_of, names_of, register
-from ._run import on_message, path_of, plain
+from ._run import on_message, path_of, plain, words_of
 
 if TYPE_CHECKING:
     from .options import Criterion, Headways, Models, Path
@@ -127,17 +127,15 @@ def simulate(
     elif type(cases).__module__.startswith("polars") and hasattr(cases, "schema"):
         # Columns of the type Null, which cannot be handed over and say nothing.
         cases = cases.select([name for name, kind in cases.schema.items() if str(kind) != "Null"])
-    headways = [] if thw is None else plain(thw, "thw")
     given: dict[str, Any] = {"category": category, "dt": dt, "reference": reference, "accept_implausible": accept_implausible}
-    given |= {"models": names_of(models), "thw": [str(one) for one in (headways if isinstance(headways, list) else [headways])]}
+    given |= {"models": names_of(models), "thw": [] if thw is None else words_of(plain(thw, "thw"))}
     try:
         frame, notes = _core.simulate(cases, given | _where(profile, backend, device), on_message)
     except (TypeError, ValueError) as error:
         # Of pyarrow, where a column holds values of several types.
         if not type(error).__module__.startswith("pyarrow"):
             raise
-        problem = f"the table cannot be handed over: {error}"
-        raise _core.InputError(f"{problem}\n  help: give every column values of one type") from None
+        raise _core.InputError(f"the table cannot be handed over: {error}\n  help: give every column values of one type") from None
     for note in notes:
         warnings.warn(note, stacklevel=2)
     return frame

@@ -58,8 +58,7 @@ def found_emphasis(
     rows = table(scenarios, "category", "target_v", "fps")
     z, category = vectors(rows), _category(rows)
     series, numbers = _LAYOUT[category]
-    data: Any = rows
-    folds = table(_verbs.study(scenarios=data).table("folds"))
+    folds = table(_verbs.study(scenarios=rows).table("folds"))
     fold = rows.join(folds, on="id", how="left", maintain_order="left")["fold"].to_numpy()
     start = [0.0] * (KNOTS * len(series) + len(numbers))
     search = cma.CMAEvolutionStrategy(start, 0.7, {"popsize": 12, "seed": seed, "bounds": [-8, 8], "verbose": -9})
@@ -130,10 +129,9 @@ def of_vectors(z: Array, scenarios: Any) -> pl.DataFrame:
 
 def _scores(rows: pl.DataFrame, described: Mapping[str, pl.DataFrame], criterion: Criterion) -> list[float]:
     """Mean F1 of every S' over the drivers for which S fails in ten scenarios."""
-    data: Any = rows
     # A bad proposal jumps sideways, and is scored all the same.
     with quiet():
-        study = _verbs.study(scenarios=data, external=described, accept_implausible=True, config={"study": {"folds": 1}})
+        study = _verbs.study(scenarios=rows, external=described, accept_implausible=True, config={"study": {"folds": 1}})
     judged = table(study.table("results")).filter((pl.col("criterion") == criterion) & (pl.col("failing_scenarios") >= 10))
     if judged.is_empty():
         raise InputError(f"no driver fails in ten of these scenarios ({criterion})\n  help: give more scenarios, or another criterion")

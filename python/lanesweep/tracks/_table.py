@@ -22,13 +22,13 @@ from ..options import Path as File
 LOG = logging.getLogger("lanesweep")
 #: Errors of a compressed file that ends early.
 _BROKEN = (EOFError, zlib.error, gzip.BadGzipFile)
-_TEXTS = ("vehicle_id", "class", "lane")
-#: The columns in their order.
-COLUMNS = (
-    *("vehicle_id", "frame", "time_s", "x_m", "y_m", "s_m", "d_m", "heading_deg", "speed_mps", "vx_mps", "vy_mps"),
-    *("forward_speed_mps", "leftward_speed_mps", "acceleration_mps2", "ax_mps2", "ay_mps2", "length_m", "width_m"),
-    *("class", "lane", "direction"),
+#: The columns in their order, with their types.
+COLUMNS: dict[str, Any] = dict.fromkeys(
+    "vehicle_id frame time_s x_m y_m s_m d_m heading_deg speed_mps vx_mps vy_mps forward_speed_mps leftward_speed_mps "
+    "acceleration_mps2 ax_mps2 ay_mps2 length_m width_m class lane direction".split(),
+    pl.Float64,
 )
+COLUMNS |= {"vehicle_id": pl.String, "frame": pl.Int64, "class": pl.String, "lane": pl.String}
 
 
 def bad(path: File, place: str, problem: str, help: str) -> InputError:
@@ -149,12 +149,11 @@ def unpacked(path: File, vehicles: pl.DataFrame, columns: Mapping[str, str], the
 def canonical(path: File, frame: pl.DataFrame) -> pl.DataFrame:
     """The columns in their order and with their types, NaN as no value; what else is no finite number, or no size, is an error."""
     frame = frame.with_columns(pl.col(pl.Float32, pl.Float64).fill_nan(None))
-    names = [name for name in COLUMNS if name in frame.columns]
-    types = {name: pl.String if name in _TEXTS else pl.Int64 if name == "frame" else pl.Float64 for name in names}
-    table = frame.select(pl.col(name).cast(dtype, strict=False) for name, dtype in types.items())
-    for name in names:
+    types = {name: kind for name, kind in COLUMNS.items() if name in frame.columns}
+    table = frame.select(pl.col(name).cast(kind, strict=False) for name, kind in types.items())
+    for name, kind in types.items():
         is_size, found = name in ("length_m", "width_m"), table[name]
-        is_good = found.is_finite() & (found > (0.0 if is_size else -math.inf)) if types[name] == pl.Float64 else found.is_not_null()
+        is_good = found.is_finite() & (found > (0.0 if is_size else -math.inf)) if kind == pl.Float64 else found.is_not_null()
         wrong = frame.filter(~is_good.fill_null(False) & frame[name].is_not_null())
         if len(wrong):
             place = ", ".join(f"{of} {wrong[of][0]}" for of in ("vehicle_id", "frame", "time_s") if of in wrong.columns)
