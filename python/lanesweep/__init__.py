@@ -12,6 +12,7 @@ m/s, lengths in m, times in s, accelerations in m/s².
 from __future__ import annotations
 
 import os as _os
+from typing import TYPE_CHECKING
 
 # Mesa's layer that chooses devices reports a missing XDG_RUNTIME_DIR on stderr, and reorders the devices, whose order is ours.
 _os.environ.setdefault("NODEVICE_SELECT", "1")
@@ -37,5 +38,6 @@ from ._result import Figure as Figure, Result as Result
 from ._simulate import LimitState as LimitState, simulate as simulate
 from ._verbs import *  # noqa: F403
 
-# Python's own `map` stays what it is after `from lanesweep import *`.
-__all__ = [name for name in globals() if not name.startswith("_") and name not in ("annotations", "map")]
+if not TYPE_CHECKING:
+    # Python's own `map` stays what it is after `from lanesweep import *`.
+    __all__ = [name for name in globals() if not name.startswith("_") and name not in ("TYPE_CHECKING", "annotations", "map")]
