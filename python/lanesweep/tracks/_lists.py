@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Mapping
 
@@ -112,7 +111,7 @@ def automatum(path: File) -> pl.DataFrame:
     polars.DataFrame
         ``vehicle_id, time_s, x_m, y_m, heading_deg, vx_mps, vy_mps, ax_mps2, ay_mps2, length_m, width_m, class, lane``.
     """
-    return json_lists(path, _AUTOMATUM, "objects").with_columns(pl.col("heading_deg") * (180.0 / math.pi))
+    return json_lists(path, _AUTOMATUM, "objects").with_columns(pl.col("heading_deg").degrees())
 
 
 def i24(path: File) -> pl.DataFrame:

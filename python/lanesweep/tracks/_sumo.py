@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
@@ -87,7 +86,7 @@ def sumo(fcd: File, types: File | Iterable[File] = ()) -> pl.DataFrame:
         raise bad(fcd, place, problem, "give the files that define it: sumo(FCD, [FILE.rou.xml, FILE.add.xml])")
     length, width = (pl.col("class").replace_strict({name: of[at] for name, of in kinds.items()}) for at in (0, 1))
     kind = {name: "truck" if of[2].lower().startswith(_TRUCKS) else of[2] for name, of in kinds.items()}
-    angle = pl.col("heading_deg") * (math.pi / 180.0)
+    angle = pl.col("heading_deg").radians()
     frame = frame.with_columns(
         x_m=pl.col("x_m") - length / 2.0 * angle.sin(),
         y_m=pl.col("y_m") - length / 2.0 * angle.cos(),
