@@ -242,7 +242,7 @@ pub fn model_of(name: &str) -> Result<ModelId> {
 /// The keyword arguments of `lanesweep.simulate`.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-pub struct Given {
+pub struct Arguments {
     category: Option<String>,
     models: Vec<String>,
     thw: Vec<String>,
@@ -254,7 +254,7 @@ pub struct Given {
     accept_implausible: bool,
 }
 
-impl Given {
+impl Arguments {
     fn options(self) -> Result<Options> {
         let mut profile = Profile::load(&self.profile)?;
         if let Some(dt_s) = self.dt {
@@ -298,11 +298,11 @@ fn run(rows: Vec<CaseParameters>, first_row: u64, options: &Options, to: &mut Ar
 
 /// Runs a table of concrete cases. See `lanesweep.simulate`.
 #[pyfunction]
-#[pyo3(signature = (cases, given, on_message=None))]
+#[pyo3(signature = (cases, arguments, on_message=None))]
 pub fn simulate(
     py: Python<'_>,
     cases: &Bound<'_, PyAny>,
-    given: Given,
+    arguments: Arguments,
     on_message: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<(Frame, Vec<String>)> {
     let stream = stream_of(cases)?;
@@ -311,8 +311,8 @@ pub fn simulate(
         .map_err(|error| input_error(format!("the table cannot be read: {error}")))?;
     watched(py, None, on_message, move || {
         embedded::exclusively(|| {
-            let value = if given.reference { ColumnKind::Binary64 } else { ColumnKind::Binary32 };
-            let options = given.options()?;
+            let value = if arguments.reference { ColumnKind::Binary64 } else { ColumnKind::Binary32 };
+            let options = arguments.options()?;
             let mut rows = ArrowRows::new(&case_columns(value), HashMap::new());
             let outcome = rows.schema();
             let mut schema = outcome.clone();

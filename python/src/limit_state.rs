@@ -56,7 +56,7 @@ pub struct LimitState(Arc<Opened>);
 /// The arguments of `lanesweep.LimitState`.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-struct Given {
+struct Arguments {
     density: PathBuf,
     model: String,
     criterion: String,
@@ -66,21 +66,21 @@ struct Given {
     device: Option<String>,
 }
 
-fn open(given: &Given) -> Result<Opened> {
+fn open(arguments: &Arguments) -> Result<Opened> {
     let unknown = || {
         let keys = Criterion::ALL.map(Criterion::key);
-        Error::unknown(Place::option("criterion"), "criterion", &given.criterion, keys, "")
+        Error::unknown(Place::option("criterion"), "criterion", &arguments.criterion, keys, "")
     };
-    let headway = match &given.thw {
+    let headway = match &arguments.thw {
         None => SampleHeadways::Sampled,
         Some(text) => SampleHeadways::Each(vec![headway_of(text)?]),
     };
-    let backend = OpenBackend::open(given.backend.parse()?, given.device.as_deref())?;
+    let backend = OpenBackend::open(arguments.backend.parse()?, arguments.device.as_deref())?;
     let opened = Opened {
-        density: read_density(&given.density)?,
-        profile: Profile::load(&given.profile)?,
-        model: model_of(&given.model)?,
-        criterion: Criterion::parse(&given.criterion).ok_or_else(unknown)?,
+        density: read_density(&arguments.density)?,
+        profile: Profile::load(&arguments.profile)?,
+        model: model_of(&arguments.model)?,
+        criterion: Criterion::parse(&arguments.criterion).ok_or_else(unknown)?,
         headway,
         backend: backend.with_cancel(embedded::token()),
     };
@@ -124,8 +124,8 @@ impl Opened {
 #[pymethods]
 impl LimitState {
     #[new]
-    fn new(py: Python<'_>, given: Given) -> PyResult<LimitState> {
-        let work = move || embedded::exclusively(|| open(&given));
+    fn new(py: Python<'_>, arguments: Arguments) -> PyResult<LimitState> {
+        let work = move || embedded::exclusively(|| open(&arguments));
         Ok(LimitState(Arc::new(watched(py, None, None, work)?)))
     }
 
