@@ -56,9 +56,7 @@ def main() -> None:
         "lateral_speed": rng.uniform(0.5, 2.0, 2000),
     }
     frame = lanesweep.simulate(cases, category="cut-in", models=["CCHDM", "FSM", JaxDriver()])
-    models = np.asarray(frame["model"])
-    for model in ("CCHDM", "FSM", "JaxDriver"):
-        print(f"{model}: {frame['collision'][models == model].mean():.3f} of the cases collide")
+    print(frame.to_pandas().groupby("model")["collision"].mean())
 
 
 if __name__ == "__main__":

@@ -1,7 +1,6 @@
 """Types of the compiled module."""
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any, final
 from typing_extensions import disjoint_base
 
@@ -82,17 +81,7 @@ class Frame:
 
 @disjoint_base
 class LimitState:
-    def __new__(
-        cls,
-        density: Any,
-        *,
-        model: str,
-        criterion: str,
-        thw: str | None,
-        profile: str,
-        backend: str,
-        device: str | None,
-    ) -> LimitState: ...
+    def __new__(cls, arguments: dict[str, Any]) -> LimitState: ...
     @property
     def parameters(self) -> list[str]: ...
     @property
@@ -113,7 +102,7 @@ class LimitState:
 def run(
     function: str,
     call: str,
-    arguments: dict[str, bool | list[str | Path]],
+    arguments: dict[str, bool | list[str]],
     on_progress: Callable[[str, int, int | None], None] | None = None,
     on_message: Callable[[str, str], None] | None = None,
 ) -> tuple[int, str, str, list[tuple[str, Frame]]]: ...
@@ -124,18 +113,7 @@ def profile(name: str) -> dict[str, Any]: ...
 def frame_of_columns(columns: dict[str, Any]) -> Frame: ...
 def frame_of_stream(bytes: bytes) -> Frame: ...
 def simulate(
-    cases: Any,
-    *,
-    category: str | None,
-    models: list[str],
-    thw: list[str],
-    profile: str,
-    dt: float | None,
-    backend: str,
-    device: str | None,
-    reference: bool,
-    accept_implausible: bool,
-    on_message: Callable[[str, str], None] | None = None,
+    cases: Any, arguments: dict[str, Any], on_message: Callable[[str, str], None] | None = None
 ) -> tuple[Frame, list[str]]: ...
 def register(
     name: str,

@@ -193,9 +193,8 @@ def _address(driver: Driver) -> int:
         try:
             import numba
         except ImportError:
-            raise _core.UsageError(
-                f"{of} is a function in Python, which numba compiles\n  help: pip install numba, or give a C function"
-            ) from None
+            help = "pip install numba, or give a C function"
+            raise _core.UsageError(f"{of} is a function in Python, which numba compiles\n  help: {help}") from None
         key = digest(found)
         if key not in _compiled:
             try:
@@ -238,11 +237,7 @@ def name_of(driver: Driver) -> str:
 
 def register(driver: Driver, known_as: str | None = None) -> str:
     """Make a driver known to the engine as it is now; return its name and fingerprint, which must be `known_as` if given."""
-    name, attention = name_of(driver), driver.attention
-    if not isinstance(name, str) or not isinstance(attention, str):
-        raise TypeError(f"driver {type(driver).__name__}: `name` and `attention` are texts, not {name!r} and {attention!r}")
-    if not isinstance(driver.may_accelerate, (bool, np.bool_)):
-        raise TypeError(f"driver {name}: `may_accelerate` is True or False, not {driver.may_accelerate!r}")
+    name = name_of(driver)
     identity = f"{name}@{fingerprint(driver)}"
     if known_as not in (None, identity):
         raise _core.InputError(
@@ -258,7 +253,7 @@ def register(driver: Driver, known_as: str | None = None) -> str:
                 compiled = _address(driver), numbers, int(driver.state_rows), in_python
             elif not in_python:
                 raise TypeError(f"driver {name}: it has neither `acceleration` nor `compiled`")
-            _core.register(name, identity.rpartition("@")[2], driver, bool(driver.may_accelerate), attention, compiled)
+            _core.register(name, identity.rpartition("@")[2], driver, driver.may_accelerate, driver.attention, compiled)
             _registered[identity] = driver
         _named[name.casefold()] = driver
     return identity
@@ -275,18 +270,16 @@ def models_of(models: Any) -> list[str | Driver]:
     """What an argument `models` names; empty for None, which means all."""
     if models is None:
         return []
-    if isinstance(models, (str, Driver)):
-        models = [models]
-    wants = "give a name, a Driver, or a list of these"
-    if isinstance(models, (type, bytes)) or not isinstance(models, Iterable):
-        raise TypeError(f"`models` is {_shown(models)}; {wants}")
-    found: list[str | Driver] = list(models)
-    if not found:
+    several: list[Any] = [models] if isinstance(models, (str, Driver, type, bytes)) or not isinstance(models, Iterable) else list(models)
+    if not several:
         raise ValueError("`models` is empty; name at least one, or leave it out for all")
-    for model in found:
+    for model in several:
         if not isinstance(model, (str, Driver)):
-            raise TypeError(f"`models` holds {_shown(model)}; {wants}")
-    return found
+            is_class = isinstance(model, type) and issubclass(model, Driver)
+            shown = f"the class {model.__name__}, not a driver of it: {model.__name__}(…)" if is_class else f"{model!r:.80}"
+            verb = "is" if models is model else "holds"
+            raise TypeError(f"`models` {verb} {shown}; give a name, a Driver, or a list of these")
+    return several
 
 
 def names_of(models: Any) -> list[str]:
@@ -299,10 +292,3 @@ def names_of(models: Any) -> list[str]:
         if name in shown[:at] and names[at] not in names[:at]:
             raise _core.UsageError(f"two drivers are called {name}: give one of them another `name`")
     return names
-
-
-def _shown(value: Any) -> str:
-    """What stands in place of a model."""
-    if isinstance(value, type) and issubclass(value, Driver):
-        return f"the class {value.__name__}, not a driver of it: {value.__name__}(…)"
-    return f"{value!r}"[:80]

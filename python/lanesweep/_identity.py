@@ -9,7 +9,6 @@ from __future__ import annotations
 import copyreg
 import ctypes
 import dis
-import enum
 import functools
 import hashlib
 import importlib
@@ -46,12 +45,7 @@ class Unreadable(Exception):
 
 
 def digest(*values: Any) -> str:
-    """Return a digest of values, the first of which is the subject of an error.
-
-    Raises
-    ------
-    Unreadable
-    """
+    """Return a digest of values, the first of which is the subject of an `Unreadable` error."""
     walk = _Walk()
     for value in values:
         walk.add(value, "it")
@@ -63,9 +57,8 @@ class _Walk:
 
     def __init__(self) -> None:
         self.hash = hashlib.sha256()
-        self.seen: dict[int, int] = {}
-        # Identities of objects stay theirs while these live.
-        self.alive: list[Any] = []
+        # By identity, which stays an object's while it lives: its position, and the object.
+        self.seen: dict[int, tuple[int, Any]] = {}
 
     def say(self, *words: object) -> None:
         text = repr(words).encode("utf-8", "backslashreplace")
@@ -73,10 +66,9 @@ class _Walk:
 
     def is_first(self, value: Any) -> bool:
         if id(value) in self.seen:
-            self.say("again", self.seen[id(value)])
+            self.say("again", self.seen[id(value)][0])
             return False
-        self.seen[id(value)] = len(self.seen)
-        self.alive.append(value)
+        self.seen[id(value)] = len(self.seen), value
         return True
 
     def add(self, value: Any, where: str) -> None:
@@ -112,14 +104,11 @@ class _Walk:
             self.say(type(value).__name__)
             for name in wrapped:
                 self.add(getattr(value, name), where)
-        elif type(value) in (list, tuple):
+        elif type(value) in (list, tuple, set, frozenset):
             self.say(type(value).__name__, len(value))
-            for at, item in enumerate(value):
+            is_ordered = type(value) in (list, tuple)
+            for at, item in enumerate(value if is_ordered else sorted(value, key=lambda item: (type(item).__name__, repr(item)))):
                 self.add(item, f"{where}[{at}]")
-        elif type(value) in (set, frozenset):
-            self.say("set", len(value))
-            for item in sorted(value, key=lambda item: (type(item).__name__, repr(item))):
-                self.add(item, f"an element of {where}")
         elif type(value) in (dict, types.MappingProxyType):
             self.say("dict", len(value))
             for key in sorted(value) if all(type(key) is str for key in value) else value:
@@ -128,9 +117,6 @@ class _Walk:
         elif type(value) is np.ndarray and value.dtype.kind != "O":
             self.say("array", value.dtype.descr, value.shape)
             self.hash.update(np.ascontiguousarray(value).tobytes())
-        elif isinstance(value, enum.Enum):
-            self.say(value.name)
-            self.add(type(value), where)
         elif isinstance(value, CFuncPtr):
             self.say("function of C", getattr(value, "__name__", None))
             self.add(list((value._objects or {}).values()), where)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 import html
 import json
 import os
 import re
 import tempfile
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,16 +16,7 @@ import numpy as np
 from ._core import Frame
 
 #: What the exit code of a result means; other codes are exceptions.
-STATUS = {
-    1: "not preventable",
-    4: "incomplete",
-    8: "undecided",
-    9: "no conflict",
-    10: "outside Annex 3",
-}
-
-#: The word of a function whose result answers a question.
-_ANSWERS = {"check": "preventable"}
+STATUS = {1: "not preventable", 4: "incomplete", 8: "undecided", 9: "no conflict", 10: "outside Annex 3"}
 
 
 class Figure:
@@ -62,26 +53,25 @@ class Figure:
         if self.numbers is None:
             raise ValueError(f"{self.path.name} has no numbers beside it; `svg` is the figure")
         table = self.numbers.to_numpy()
-        records = [dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=True)]
-        panels = list(dict.fromkeys(record["panel"] for record in records))
+        panels = list(dict.fromkeys(table["panel"]))
         columns = min(len(panels), 3)
-        figure, axes = plt.subplots(
-            -(-len(panels) // columns), columns, squeeze=False, figsize=(4 * columns + 2, 3.5 * -(-len(panels) // columns) + 1), layout="constrained"
-        )
+        rows = -(-len(panels) // columns)
+        figure, axes = plt.subplots(rows, columns, squeeze=False, figsize=(4 * columns + 2, 3.5 * rows + 1), layout="constrained")
         for axis in axes.flat[len(panels) :]:
             axis.remove()
         for panel, axis in zip(panels, axes.flat, strict=False):
-            own = [record for record in records if record["panel"] == panel]
-            names = list(dict.fromkeys(record["row"] for record in own if record["row"]))
-            for name in dict.fromkeys(record["series"] for record in own):
-                series = [record for record in own if record["series"] == name]
+            own = {key: values[table["panel"] == panel] for key, values in table.items()}
+            names = list(dict.fromkeys(filter(None, own["row"])))
+            for name in dict.fromkeys(own["series"]):
+                of = {key: values[own["series"] == name] for key, values in own.items()}
                 # Rows with a name have their place on the other axis.
-                x = [record["x"] for record in series]
-                y = [-names.index(record["row"]) if np.isnan(record["y"]) else record["y"] for record in series]
-                axis.errorbar(x, y, xerr=_bars(series, x), fmt="o" if names else "o-", markersize=4, label=name)
-            if names and np.isnan(own[0]["y"]):
+                y = [-names.index(row) if np.isnan(value) else value for row, value in zip(of["row"], of["y"], strict=True)]
+                ends = np.abs(np.array([of["x_low"], of["x_high"]]) - of["x"])
+                bars = None if np.isnan(ends[0]).all() else np.nan_to_num(ends)
+                axis.errorbar(of["x"], y, xerr=bars, fmt="o" if names else "o-", markersize=4, label=name)
+            if names and np.isnan(own["y"][0]):
                 axis.set_yticks([-at for at in range(len(names))], names)
-            axis.set(title=panel, xlabel=own[0]["x_quantity"], ylabel=own[0]["y_quantity"])
+            axis.set(title=panel, xlabel=own["x_quantity"][0], ylabel=own["y_quantity"][0])
         figure.legend(*axes.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=columns, fontsize="small")
         # What the figure says of itself, synthetic data first of all.
         said = [re.search(f"<{tag}>(.*?)</{tag}>", self.svg, re.DOTALL) for tag in ("title", "desc")]
@@ -94,12 +84,6 @@ class Figure:
 
     def __repr__(self) -> str:
         return f"Figure({self.path.name!r})"
-
-
-def _bars(rows: list[dict[str, Any]], at: list[float]) -> Any:
-    """Distances to the ends of intervals, as Matplotlib takes them; none without any."""
-    ends = np.array([[row[f"x_{end}"] for row in rows] for end in ("low", "high")])
-    return None if np.isnan(ends[0]).all() else np.abs(np.where(np.isnan(ends), at, ends) - np.array(at))
 
 
 class _Kept(type(Path())):  # type: ignore[misc]
@@ -132,32 +116,29 @@ class Result:
         self, verb: str, code: int, text: str, document: str, tables: list[tuple[str, Frame]], messages: list[str], path: Path | None, keep: Any
     ) -> None:
         self.verb = verb
-        self.status = _ANSWERS.get(verb, "ok") if code == 0 else STATUS.get(code, str(code))
+        self.status = STATUS.get(code, str(code)) if code else "preventable" if verb == "check" else "ok"
         self.text = text or "\n".join(messages)
         self.messages = messages
         self.path = path
         self._keep = keep
         self._json = document
         self._tables = dict(tables)
-        self._document: dict[str, Any] | None = None
 
     @property
     def folder(self) -> Path | None:
         return self.path if self.path is not None and self.path.is_dir() else None
 
-    @property
+    @functools.cached_property
     def document(self) -> dict[str, Any]:
-        if self._document is None:
-            found = json.loads(self._json or "{}", object_hook=_with_infinity)
-            self._document = found if isinstance(found, dict) else {"rows": found}
-        return self._document
+        found = json.loads(self._json or "{}", object_hook=_with_infinity)
+        return found if isinstance(found, dict) else {"rows": found}
 
     @property
     def densities(self) -> dict[str, Path]:
         """Density files of a fit, by category and parameterization: ``"cut-in-2"``."""
         if self.verb != "fit" or self.path is None:
             return {}
-        found = self._files("*.json") if self.path.is_dir() else iter([self.path])
+        found = self.path.rglob("*.json") if self.path.is_dir() else [self.path]
         kept = [_Kept(path) for path in sorted(found) if not path.name.startswith("lanesweep-")]
         for path in kept:
             path.keep = self._keep
@@ -177,14 +158,17 @@ class Result:
     @property
     def figures(self) -> list[str]:
         """Names of the figures."""
-        return sorted(path.stem for path in self._files("*.svg"))
+        return sorted(self._figures())
 
     def figure(self, name: str) -> Figure:
         """Return a figure."""
-        path = next((path for path in self._files("*.svg") if path.stem == name), None)
-        if path is None:
+        paths = self._figures()
+        if name not in paths:
             raise KeyError(f"there is no figure `{name}`; there are {', '.join(self.figures)}")
-        return Figure(path, self._tables.get(name), self._keep)
+        return Figure(paths[name], self._tables.get(name), self._keep)
+
+    def _figures(self) -> dict[str, Path]:
+        return {path.stem: path for path in self.folder.rglob("*.svg")} if self.folder is not None else {}
 
     def save(self, folder: str | os.PathLike[str]) -> Path:
         """Copy the files into a new folder."""
@@ -198,9 +182,6 @@ class Result:
         else:
             shutil.copy2(self.path, target)
         return target
-
-    def _files(self, pattern: str) -> Iterator[Path]:
-        return self.folder.rglob(pattern) if self.folder is not None else iter(())
 
     def __fspath__(self) -> str:
         if self.path is None:

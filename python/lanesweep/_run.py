@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import csv
-import importlib
-import json
+import importlib.util
 import logging
 import numbers
 import os
@@ -12,7 +11,7 @@ import re
 import sys
 import tempfile
 import warnings
-from collections.abc import Callable, Collection, Iterator, KeysView, Mapping, Sequence, Set, ValuesView
+from collections.abc import Callable, Collection, KeysView, Mapping, Sequence, Set, ValuesView
 from pathlib import Path
 from typing import Any
 
@@ -23,14 +22,12 @@ from ._driver import names_of, refresh
 from ._result import Result, temporary
 
 _log = logging.getLogger("lanesweep")
-#: Code of a run that found nothing that it could use, each with its message.
-_NOTHING = 3
-_LEVELS = {"ERROR": logging.ERROR, "WARN": logging.WARNING, "INFO": logging.INFO, "DEBUG": logging.DEBUG, "TRACE": logging.DEBUG}
 
 
 def on_message(level: str, line: str) -> None:
     """Pass a line of the program's log on to `logging`, under the name ``lanesweep``."""
-    _log.log(_LEVELS.get(level, logging.INFO), "%s", line)
+    # Python has no level TRACE.
+    _log.log(getattr(logging, level, logging.DEBUG), "%s", line)
 
 
 def progress() -> tuple[Callable[[str, int, int | None], None] | None, Callable[[], None]]:
@@ -38,15 +35,13 @@ def progress() -> tuple[Callable[[str, int, int | None], None] | None, Callable[
 
     The bar is that of `tqdm` if it is installed; in a terminal or notebook only.
     """
-    try:
-        with warnings.catch_warnings():
-            # Without ipywidgets, tqdm draws its bar as text and warns about it.
-            warnings.simplefilter("ignore")
-            tqdm: Any = importlib.import_module("tqdm.auto").tqdm
-    except ImportError:
+    is_seen = (sys.stderr is not None and sys.stderr.isatty()) or "ipykernel" in sys.modules
+    if not is_seen or importlib.util.find_spec("tqdm") is None:
         return None, lambda: None
-    if not (sys.stderr is not None and sys.stderr.isatty()) and "ipykernel" not in sys.modules:
-        return None, lambda: None
+    with warnings.catch_warnings():
+        # Without ipywidgets, tqdm draws its bar as text and warns about it.
+        warnings.simplefilter("ignore")
+        tqdm: Any = importlib.import_module("tqdm.auto").tqdm
     bar: Any = None
 
     def move(what: str, done: int, total: int | None) -> None:
@@ -60,40 +55,38 @@ def progress() -> tuple[Callable[[str, int, int | None], None] | None, Callable[
         nonlocal bar
         if bar is not None:
             bar.close()
-            bar = None
+        bar = None
 
     return move, close
 
 
-#: Arguments that take names with values.
-_TABLES = ("config", "panel", "set")
-
-
 def plain(value: Any, name: str) -> Any:
-    """Return the value of an argument as a number, text or path, or a list or dictionary of these."""
-    if name in _TABLES and hasattr(value, "to_dict"):
+    """Return the value of an argument as a number, a text (of a path, too), or a list or dictionary of these."""
+    if name in ("config", "panel", "set") and hasattr(value, "to_dict"):
         # A Series.
         value = value.to_dict()
     if not isinstance(value, Mapping):
         return _list_or_scalar(value, name)
-    if not len(value):
-        raise ValueError(f"`{name}` is empty; give at least one value, or leave it out")
     rows: dict[str, Any] = {}
-    for key, one in value.items():
+    for key, one in _some(value, name).items():
         # Tables of a configuration: {"run": {"dt_s": 0.05}}.
         inner = {f"{key}.{of}": two for of, two in one.items()} if isinstance(one, Mapping) and name == "config" else {str(key): one}
         rows |= {of: _list_or_scalar(two, name) for of, two in inner.items()}
     return rows
 
 
+def _some(values: Any, name: str) -> Any:
+    if not len(values):
+        raise ValueError(f"`{name}` is empty; give at least one value, or leave it out")
+    return values
+
+
 def _list_or_scalar(value: Any, name: str) -> Any:
     value = _of_array(value)
     if isinstance(value, (Sequence, Set, KeysView, ValuesView)) and not isinstance(value, (str, bytes, bytearray)):
-        if not len(value):
-            raise ValueError(f"`{name}` is empty; give at least one value, or leave it out")
         # A set has no order of its own.
         several = sorted(value, key=lambda one: (str(type(one)), one)) if isinstance(value, Set) else value
-        return [_scalar(one, name) for one in several]
+        return [_scalar(_of_array(one), name) for one in _some(several, name)]
     return _scalar(value, name)
 
 
@@ -110,11 +103,10 @@ def _of_array(value: Any) -> Any:
 
 
 def _scalar(value: Any, name: str) -> Any:
-    value = _of_array(value)
     if isinstance(value, (bool, str)):
         return value
     if isinstance(value, os.PathLike):
-        return Path(path_of(value, name))
+        return path_of(value, name)
     if isinstance(value, numbers.Integral):
         return int(value)
     if isinstance(value, numbers.Real):
@@ -139,22 +131,21 @@ def is_table(value: Any) -> bool:
     return hasattr(value, "__arrow_c_stream__") or hasattr(value, "to_csv")
 
 
-def table_file(table: Any, path: Path) -> Path:
-    """Write a table into a file: Parquet, or CSV without pyarrow."""
+def table_file(table: Any, path: Path) -> str:
+    """Write a table into a file: Parquet, or CSV of pandas without pyarrow."""
+    file = f"{path}.parquet"
     if hasattr(table, "write_parquet"):
-        table.write_parquet(path.with_suffix(".parquet"))
-        return path.with_suffix(".parquet")
-    try:
-        parquet: Any = importlib.import_module("pyarrow.parquet")
-    except ImportError:
-        if not hasattr(table, "to_csv"):
-            raise
-        table.to_csv(path.with_suffix(".csv"), index=False)
-        return path.with_suffix(".csv")
-    arrow: Any = importlib.import_module("pyarrow")
-    made = arrow.Table.from_pandas(table, preserve_index=False) if hasattr(table, "to_csv") else arrow.table(table)
-    parquet.write_table(made, path.with_suffix(".parquet"))
-    return path.with_suffix(".parquet")
+        table.write_parquet(file)
+    elif hasattr(table, "to_csv"):
+        try:
+            table.to_parquet(file, index=False)
+        except ImportError:
+            file = f"{path}.csv"
+            table.to_csv(file, index=False)
+    else:
+        arrow: Any = importlib.import_module("pyarrow")
+        importlib.import_module("pyarrow.parquet").write_table(arrow.table(table), file)
+    return file
 
 
 def row_file(row: Any, path: Path) -> Path:
@@ -165,38 +156,20 @@ def row_file(row: Any, path: Path) -> Path:
     return path
 
 
-def _texts(value: Any) -> Iterator[str]:
-    """The texts in a value."""
-    if isinstance(value, str):
-        yield value
-    elif isinstance(value, (list, dict)):
-        for one in value.values() if isinstance(value, dict) else value:
-            yield from _texts(one)
-
-
-def _word(value: Any) -> str | Path:
+def _word(value: Any) -> str:
     """Return a value as a command line has it."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, list):
-        return ",".join(str(_word(one)) for one in value)
-    return repr(value).removesuffix(".0") if isinstance(value, float) else value if isinstance(value, Path) else str(value)
+        return ",".join(map(_word, value))
+    return repr(value).removesuffix(".0") if isinstance(value, float) else str(value)
 
 
-def _words(value: Any) -> bool | list[str | Path]:
+def words_of(value: Any) -> bool | list[str]:
     """Return the value of an argument as words of a command line."""
     if isinstance(value, dict):
         return [f"{name}={_word(one)}" for name, one in value.items()]
     return value if isinstance(value, bool) else [_word(one) for one in (value if isinstance(value, list) else [value])]
-
-
-def _shown(value: Any) -> str:
-    """Write a value as in a call."""
-    if isinstance(value, list):
-        return f"[{', '.join(_shown(one) for one in value)}]"
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{_shown(name)}: {_shown(one)}" for name, one in value.items()) + "}"
-    return json.dumps(str(value), ensure_ascii=False) if isinstance(value, (str, Path)) else repr(value)
 
 
 def _in_words(text: str) -> str:
@@ -221,36 +194,29 @@ def run(function: str, arguments: Mapping[str, Any]) -> Result:
             default_out, path = None, None if are_several else given["convert"]
     if given.get("models") is not None:
         given["models"] = names_of(given["models"])
-    keep = None
+    keep = temporary()
+    folder = Path(keep.name)
     for name in ("scenarios", "file", "table"):
         value: Any = given.get(name)
         value = value._asdict() if hasattr(value, "_asdict") else value  # a row of `itertuples`
         is_row = isinstance(value, Mapping) or getattr(value, "ndim", 2) == 1
         if is_row and name != "scenarios":
-            keep = keep or temporary()
-            given[name], given["row"] = row_file(value, Path(keep.name) / f"{name}.csv"), given.get("row") or 1
+            given[name], given["row"] = row_file(value, folder / f"{name}.csv"), given.get("row") or 1
         elif is_table(value):
-            keep = keep or temporary()
-            given[name] = table_file(value, Path(keep.name) / name)
+            given[name] = table_file(value, folder / name)
         elif isinstance(value, (tuple, list)):
             raise _core.UsageError(f"`{name}` is {value!r:.80}\n  help: give a file, a table, or a row with its names: a mapping")
     external = given.get("external")
-    tables = external if isinstance(external, Mapping) else {"external": external} if is_table(external) else {}
-    if tables:
-        keep = keep or temporary()
-        given["external"] = [
-            table_file(one, Path(keep.name) / str(name)) if is_table(one) else one for name, one in tables.items()
-        ]
+    external = {"external": external} if is_table(external) else external
+    if isinstance(external, Mapping):
+        given["external"] = [table_file(one, folder / str(name)) if is_table(one) else one for name, one in external.items()]
     data = given.get("recordings")
     if function != "mine" and isinstance(data, (str, os.PathLike)) and path_of(data, "recordings").endswith(".jsonl"):
         raise _core.UsageError("`recordings`: this is a scenario file\n  help: give it as `scenarios`")
-    named = {"from" if name == "from_" else name: value for name, value in given.items() if value is not None}
-    values = {name: plain(value, name) for name, value in named.items()}
-    if "out" not in values and default_out is not None:
-        keep = keep or temporary()
-        values["out"] = Path(keep.name) / default_out
-    if "out" in values:
-        path = values["out"]
+    values = {name.removesuffix("_"): plain(value, name) for name, value in given.items() if value is not None}
+    if default_out is not None:
+        values.setdefault("out", str(folder / default_out))
+    path = values.get("out", path)
     messages: list[str] = []
 
     def on_line(level: str, line: str) -> None:
@@ -259,16 +225,17 @@ def run(function: str, arguments: Mapping[str, Any]) -> Result:
         on_message(level, line)
 
     move, close = progress()
-    refresh(_texts(values))
-    shown = ", ".join(f"{name}={_shown(value)}" for name, value in values.items() if name != "out" and value is not False)
+    words = {name: words_of(value) for name, value in values.items()}
+    refresh(word for several in words.values() if isinstance(several, list) for word in several)
+    shown = ", ".join(f"{name}={value!r}" for name, value in values.items() if name != "out" and value is not False)
     call = os.fsencode(f"lanesweep.{function}({shown})").decode(errors="replace")
     try:
-        code, text, document, frames = _core.run(function, call, {name: _words(value) for name, value in values.items()}, move, on_line)
+        code, text, document, frames = _core.run(function, call, words, move, on_line)
     except _core.LanesweepError as error:
         error.args, error.problem = (_in_words(str(error)),), _in_words(getattr(error, "problem", ""))
         raise
     finally:
         close()
-    if code == _NOTHING:
+    if code == 3:  # nothing that could be used, each with its message
         raise _core.InputError("\n".join(messages) or "there is nothing that can be read")
     return Result(function, code, _in_words(text), document, frames, messages, None if path is None else Path(path_of(path, "out")), keep)

@@ -8,7 +8,7 @@ import json
 import os
 import warnings
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, SupportsFloat
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +16,7 @@ import numpy.typing as npt
 from . import _core
 from ._core import Frame
 from ._driver import Driver, name_of, names_of, register
-from ._run import on_message, path_of, plain
+from ._run import on_message, path_of, plain, words_of
 
 if TYPE_CHECKING:
     from .options import Criterion, Headways, Models, Path
@@ -31,29 +31,25 @@ def _column(name: str, values: Any) -> Any:
         raise _core.InputError(f"column `{name}` has the shape {array.shape}: give one value per case, or one for all")
     if array.dtype.kind in "biuf":
         return array.astype(np.float64)
-    items = [None if value is None or type(value).__name__ == "NAType" else value for value in array.reshape(-1).tolist()]
-    if any(isinstance(value, str) for value in items) or array.dtype.kind in "cmM":
-        if not all(value is None or isinstance(value, (str, int, float)) for value in items):
-            raise _core.InputError(f"column `{name}` holds {array.dtype}; expected numbers, or texts such as 60km/h")
-        # NaN beside texts is a value that is not given; a number beside texts may need no unit.
-        items = [None if value != value else repr(value) if isinstance(value, (int, float)) else value for value in items]
-        return np.array(items, dtype=object).reshape(array.shape)
-    try:
-        return np.array([np.nan if value is None else float(value) for value in items]).reshape(array.shape)
-    except (TypeError, ValueError) as error:
-        raise _core.InputError(f"column `{name}`: {error}; expected numbers, or texts for `category`") from None
+    items = [None if value is None or type(value).__name__ == "NAType" or value != value else value for value in array.reshape(-1).tolist()]
+    if array.dtype.kind in "cmM" or not all(isinstance(value, (str, SupportsFloat, type(None))) for value in items):
+        raise _core.InputError(f"column `{name}` holds {array.dtype}; expected numbers, or texts such as 60km/h")
+    if any(isinstance(value, str) for value in items):
+        # A number beside texts may need no unit.
+        return np.array([value if value is None else str(value) for value in items], dtype=object).reshape(array.shape)
+    return np.array([np.nan if value is None else float(value) for value in items]).reshape(array.shape)
 
 
 def _frame_of(columns: Mapping[str, Any]) -> Frame:
     """Make a table of columns; a scalar holds for all rows."""
     arrays = {str(name): _column(str(name), values) for name, values in columns.items()}
-    lengths = {array.size for array in arrays.values() if array.ndim == 1}
+    lengths = {array.size for array in arrays.values() if array.ndim == 1} or {1}
     if len(lengths) > 1:
         raise _core.InputError(f"the columns differ in length ({sorted(lengths)}): give one value per case, or one for all")
-    count = lengths.pop() if lengths else 1
-    full = {name: np.broadcast_to(array, (count,)) for name, array in arrays.items()}
-    table = {name: array.tolist() if array.dtype == object else np.ascontiguousarray(array) for name, array in full.items()}
-    return _core.frame_of_columns(table)
+    full = {name: np.broadcast_to(array, (*lengths,)) for name, array in arrays.items()}
+    return _core.frame_of_columns(
+        {name: array.tolist() if array.dtype == object else np.ascontiguousarray(array) for name, array in full.items()}
+    )
 
 
 def simulate(
@@ -118,10 +114,9 @@ def simulate(
     """
     if isinstance(cases, (str, os.PathLike)) or (isinstance(cases, Mapping) and not cases):
         raise _core.InputError(f"`cases` is {cases!r:.80}\n  help: give a table of cases; `check` and `trace` read files")
-    library = type(cases).__module__.split(".")[0]
     if isinstance(cases, Mapping):
         cases = _frame_of(cases)
-    elif library == "pandas" and hasattr(cases, "reset_index"):
+    elif type(cases).__module__.startswith("pandas") and hasattr(cases, "reset_index"):
         # Rows are counted from 0. An index that counts them as well is no column.
         index = cases.index
         counts = type(index).__name__ == "RangeIndex" and index.name is None and index.start == 0 and index.step == 1
@@ -129,33 +124,26 @@ def simulate(
         if not hasattr(cases, "__arrow_c_stream__") or importlib.util.find_spec("pyarrow") is None:
             # pandas hands out Arrow data from 2.2 on, if pyarrow is installed.
             cases = _frame_of({name: cases[name].to_numpy() for name in cases.columns})
-    elif library == "polars" and hasattr(cases, "schema"):
-        # Columns without any value have no type, and nothing to say.
+    elif type(cases).__module__.startswith("polars") and hasattr(cases, "schema"):
+        # Columns of the type Null, which cannot be handed over and say nothing.
         cases = cases.select([name for name, kind in cases.schema.items() if str(kind) != "Null"])
-    headways = [] if thw is None else plain(thw, "thw")
+    given: dict[str, Any] = {"category": category, "dt": dt, "reference": reference, "accept_implausible": accept_implausible}
+    given |= {"models": names_of(models), "thw": [] if thw is None else words_of(plain(thw, "thw"))}
     try:
-        frame, notes = _core.simulate(
-            cases,
-            category=category,
-            models=names_of(models),
-            thw=[str(one) for one in (headways if isinstance(headways, list) else [headways])],
-            profile=path_of(profile, "profile"),
-            dt=dt,
-            backend=backend,
-            device=None if device is None else str(device),
-            reference=reference,
-            accept_implausible=accept_implausible,
-            on_message=on_message,
-        )
+        frame, notes = _core.simulate(cases, given | _where(profile, backend, device), on_message)
     except (TypeError, ValueError) as error:
         # Of pyarrow, where a column holds values of several types.
         if not type(error).__module__.startswith("pyarrow"):
             raise
-        problem = f"the table cannot be handed over: {error}"
-        raise _core.InputError(f"{problem}\n  help: give every column values of one type") from None
+        raise _core.InputError(f"the table cannot be handed over: {error}\n  help: give every column values of one type") from None
     for note in notes:
         warnings.warn(note, stacklevel=2)
     return frame
+
+
+def _where(profile: Path, backend: str, device: str | int | None) -> dict[str, Any]:
+    """Arguments of the engine."""
+    return {"profile": path_of(profile, "profile"), "backend": backend, "device": None if device is None else str(device)}
 
 
 class LimitState(_core.LimitState):
@@ -211,19 +199,10 @@ class LimitState(_core.LimitState):
         if not isinstance(model, (str, Driver)):
             raise TypeError(f"`model` is {model!r:.80}; give one model: a name or a Driver")
         (known_as,) = names_of(model)
-        made = super().__new__(
-            cls,
-            path_of(density, "density"),
-            model=known_as,
-            criterion=criterion,
-            thw=None if thw is None else str(thw),
-            profile=path_of(profile, "profile"),
-            backend=backend,
-            device=None if device is None else str(device),
-        )
+        given = {"density": path_of(density, "density"), "criterion": criterion, "thw": None if thw is None else str(thw)}
+        made = super().__new__(cls, given | {"model": known_as} | _where(profile, backend, device))
         assert isinstance(made, cls)
-        made._arguments = {"density": os.fspath(density), "model": model, "criterion": criterion, "thw": thw}
-        made._arguments |= {"profile": profile, "backend": backend, "device": device}
+        made._arguments = given | {"model": model, "profile": profile, "backend": backend, "device": device}
         made._known_as = known_as
         made._keep = density
         return made
@@ -265,14 +244,12 @@ class LimitState(_core.LimitState):
         """Points as an array; columns of a data frame by their names."""
         if np.ma.isMaskedArray(points):
             points = np.ma.filled(points, np.nan)
-        if hasattr(points, "columns") and hasattr(points, "__getitem__"):
+        if hasattr(points, "columns"):
             missing = [name for name in self.parameters if name not in list(points.columns)]
             if missing:
                 raise _core.InputError(f"the points have no column {', '.join(missing)}; expected {', '.join(self.parameters)}")
-            points = np.column_stack([np.asarray(points[name], dtype=np.float64) for name in self.parameters])
-        array = np.ascontiguousarray(points, dtype=np.float64)
-        if array.ndim == 1:
-            array = array[np.newaxis, :]
+            points = np.column_stack([points[name] for name in self.parameters])
+        array = np.ascontiguousarray(np.atleast_2d(np.asarray(points, dtype=np.float64)))
         if array.ndim != 2:
             raise _core.InputError(f"points have {array.ndim} dimensions; give an array of shape (n, d)")
         return array

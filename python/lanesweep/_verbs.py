@@ -144,8 +144,8 @@ def study(
     models : Models
         Driver models: Reg157, CCHDM, RSS, FSM, by default all.
     profile : Path
-        paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc` takes
-        jrc-2021 unless it is set.
+        paper, paper-fit, jrc-2021, un-r157, eu-2022-1426, eu-2022-1426-standing. Name of a profile, or a TOML file of
+        your own. `map --preset jrc` takes jrc-2021 unless it is set.
     dt : Number, s
         Time step, by default the profile's.
     out : Path
@@ -398,8 +398,8 @@ def sample(
     models : Models
         Driver models: Reg157, CCHDM, RSS, FSM, by default all.
     profile : Path
-        paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc` takes
-        jrc-2021 unless it is set.
+        paper, paper-fit, jrc-2021, un-r157, eu-2022-1426, eu-2022-1426-standing. Name of a profile, or a TOML file of
+        your own. `map --preset jrc` takes jrc-2021 unless it is set.
     dt : Number, s
         Time step, by default the profile's.
     estimator : Literal["auto", "mc", "is"]
@@ -503,8 +503,8 @@ def map(
         Mark cells whose outcome changes with a tenth of the time step, 1 cm or 0.1 km/h. They are undecided. Each cell
         is simulated eight times; sheets show undecided cells in their own colour.
     profile : Path
-        paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc` takes
-        jrc-2021 unless it is set.
+        paper, paper-fit, jrc-2021, un-r157, eu-2022-1426, eu-2022-1426-standing. Name of a profile, or a TOML file of
+        your own. `map --preset jrc` takes jrc-2021 unless it is set.
     dt : Number, s
         Time step, by default the profile's.
     out : Path
@@ -680,8 +680,8 @@ def trace(
     models : Models
         Driver models: Reg157, CCHDM, RSS, FSM, by default all.
     profile : Path
-        paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc` takes
-        jrc-2021 unless it is set.
+        paper, paper-fit, jrc-2021, un-r157, eu-2022-1426, eu-2022-1426-standing. Name of a profile, or a TOML file of
+        your own. `map --preset jrc` takes jrc-2021 unless it is set.
     dt : Number, s
         Time step, by default the profile's.
     plot : Path

@@ -6,6 +6,7 @@ of `PRESENT`, `ATTENDED` (1 or 0), `SPEED`, `GAP`, `LATERAL_GAP`, `LATERAL_SPEED
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -64,6 +65,7 @@ class Reg157(Driver):
         return np.where(is_unsafe & ~waits, -state["deceleration"], f32(0))
 
 
+@dataclass(kw_only=True, eq=False)
 class IDM(Driver):
     """The Intelligent Driver Model of Treiber, Hennecke and Helbing (2000).
 
@@ -81,22 +83,12 @@ class IDM(Driver):
         Limit of the brakes, m/s².
     """
 
-    def __init__(
-        self,
-        *,
-        desired_speed_mps: float | None = None,
-        headway_s: float = 1.5,
-        max_acceleration_mps2: float = 1.0,
-        comfortable_deceleration_mps2: float = 2.0,
-        jam_distance_m: float = 2.0,
-        max_deceleration_mps2: float = 8.0,
-    ) -> None:
-        self.desired_speed_mps = desired_speed_mps
-        self.headway_s = headway_s
-        self.max_acceleration_mps2 = max_acceleration_mps2
-        self.comfortable_deceleration_mps2 = comfortable_deceleration_mps2
-        self.jam_distance_m = jam_distance_m
-        self.max_deceleration_mps2 = max_deceleration_mps2
+    desired_speed_mps: float | None = None
+    headway_s: float = 1.5
+    max_acceleration_mps2: float = 1.0
+    comfortable_deceleration_mps2: float = 2.0
+    jam_distance_m: float = 2.0
+    max_deceleration_mps2: float = 8.0
 
     def start(self, lanes: int, dt_s: float) -> dict[str, Any]:
         return {"desired": np.full(lanes, np.nan, dtype=f32)}

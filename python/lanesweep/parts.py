@@ -71,18 +71,14 @@ def plan(function: Callable[..., Result], *args: Any, shards: int = 8, **argumen
         raise TypeError(f"`function` is {function!r:.80}; give lanesweep.study or lanesweep.sample itself")
     if function.__name__ not in ("study", "sample"):
         raise ValueError(f"{function.__name__} cannot be split; study and sample can")
-    if not isinstance(shards, int):
-        raise TypeError(f"`shards` is {shards!r:.80}; give a whole number")
-    if shards < 1:
-        raise ValueError(f"{shards} parts; give at least 1")
-    models = arguments.get("models")
-    several = models_of(models)
-    if models is not None:
-        arguments["models"] = several
-    drivers = tuple((model, register(model)) for model in several if isinstance(model, Driver))
+    if not isinstance(shards, int) or shards < 1:
+        raise TypeError(f"`shards` is {shards!r:.80}; give a whole number of at least 1")
+    given = inspect.signature(function).bind(*args, **arguments).arguments
+    # What can be iterated over once only is kept.
+    models = models_of(given.get("models"))
+    drivers = tuple((model, register(model)) for model in models if isinstance(model, Driver))
     with temporary() as folder:
-        given = inspect.signature(function).bind(*args, **arguments).arguments
-        verb(function.__name__, {**given, "plan_only": True, "out": folder})
+        verb(function.__name__, {**given, "models": models or None, "plan_only": True, "out": folder})
         content = (Path(folder) / "plan.json").read_bytes()
     return Plan(function.__name__, content, shards, drivers)
 
@@ -120,24 +116,20 @@ def join(plan: Plan, parts: Iterable[Part], *, out: str | os.PathLike[str] | Non
     """
     plan._register()
     keep = temporary() if out is None else None
-    folder = Path(keep.name) / "run" if keep is not None else Path(os.fspath(out or ""))
+    folder = Path(keep.name) / "run" if keep is not None else Path(out or "")
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "plan.json").write_bytes(plan.content)
-    names: set[str] = set()
-    for part in parts:
-        for name, content in part.items():
-            if Path(name).name != name or not name.startswith("part-"):
-                raise InputError(f"`{name}` is no file of a part")
-            if name in names:
-                raise InputError(f"{name} is there twice: give every part once")
-            names.add(name)
-            (folder / name).write_bytes(content)
+    names = {"plan.json"}
+    for name, content in (file for part in parts for file in part.items()):
+        if name in names:
+            raise InputError(f"{name} is there twice: give every part once")
+        names.add(name)
+        (folder / name).write_bytes(content)
     missing = [k for k in range(plan.shards) if not any(name.startswith(f"part-{k:05}-of-") for name in names)]
     if missing:
-        listed = ", ".join(map(str, missing))
-        raise InputError(f"{len(missing)} of {plan.shards} parts are missing: {listed}\n  help: run(plan, {missing[0]}) makes one")
+        raise InputError(f"{len(missing)} of {plan.shards} parts are missing: {str(missing)[1:-1]}\n  help: run(plan, {missing[0]}) makes one")
     result = merge(folder)
-    for name in names | {"plan.json"}:
+    for name in names:
         (folder / name).unlink(missing_ok=True)
     result._keep = keep
     return result

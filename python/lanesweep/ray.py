@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager
 from typing import Any
 
 import numpy as np
@@ -114,7 +115,7 @@ class _Evaluator:
         return self.limit_state(points)
 
 
-class limit_state:
+class limit_state(AbstractContextManager["limit_state"]):
     """A `LimitState` in several workers: every call is one batch of tasks, so that an adaptive estimator makes one
     batch per round. A lost worker is started again. The workers keep their cores until `close`, or the end of a ``with`` block.
 
@@ -145,9 +146,6 @@ class limit_state:
         actors, self._actors = self._actors, []
         for actor in actors:
             ray.kill(actor)
-
-    def __enter__(self) -> limit_state:
-        return self
 
     def __exit__(self, *error: object) -> None:
         self.close()

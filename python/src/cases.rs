@@ -4,11 +4,10 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use arrow_array::cast::AsArray;
-use arrow_array::types::{
-    Decimal128Type, Float16Type, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type,
-    UInt16Type, UInt32Type, UInt64Type,
+use arrow_array::types::{Decimal128Type, Float16Type, Float32Type, Float64Type};
+use arrow_array::{
+    Array, ArrayRef, Float64Array, Int64Array, RecordBatch, StringArray, UInt64Array, downcast_integer_array,
 };
-use arrow_array::{Array, ArrayRef, Float64Array, Int64Array, RecordBatch, StringArray, UInt64Array};
 use arrow_schema::{DataType, Field, Schema};
 use arrow_select::take::take;
 use lanesweep::cli::embedded;
@@ -34,25 +33,19 @@ const CASES: usize = 1 << 16;
 
 /// A column of a batch as numbers; null is a missing value.
 fn numbers(array: &dyn Array) -> Option<Vec<Option<f64>>> {
-    macro_rules! of {
-        ($($type:ident => $arrow:ident),+) => {
-            match array.data_type() {
-                $(DataType::$type => array.as_primitive::<$arrow>().iter().map(|v| v.map(|v| v as f64)).collect(),)+
-                DataType::Null => vec![None; array.len()],
-                DataType::Float16 => array.as_primitive::<Float16Type>().iter().map(|v| v.map(f64::from)).collect(),
-                DataType::Decimal128(_, scale) => {
-                    let unit = 10_f64.powi((*scale).into());
-                    array.as_primitive::<Decimal128Type>().iter().map(|v| v.map(|v| v as f64 / unit)).collect()
-                }
-                DataType::Dictionary(..) => of_names(array, numbers)?,
-                _ => return None,
-            }
-        };
-    }
-    Some(of!(
-        Float64 => Float64Type, Float32 => Float32Type, Int64 => Int64Type, Int32 => Int32Type, Int16 => Int16Type,
-        Int8 => Int8Type, UInt64 => UInt64Type, UInt32 => UInt32Type, UInt16 => UInt16Type, UInt8 => UInt8Type
-    ))
+    Some(downcast_integer_array! {
+        array => array.iter().map(|v| v.map(|v| v as f64)).collect(),
+        DataType::Float64 => array.as_primitive::<Float64Type>().iter().collect(),
+        DataType::Float32 => array.as_primitive::<Float32Type>().iter().map(|v| v.map(f64::from)).collect(),
+        DataType::Float16 => array.as_primitive::<Float16Type>().iter().map(|v| v.map(f64::from)).collect(),
+        DataType::Decimal128(_, scale) => {
+            let unit = 10_f64.powi((*scale).into());
+            array.as_primitive::<Decimal128Type>().iter().map(|v| v.map(|v| v as f64 / unit)).collect()
+        }
+        DataType::Null => vec![None; array.len()],
+        DataType::Dictionary(..) => of_names(array, numbers)?,
+        _ => return None,
+    })
 }
 
 /// A column of a batch as texts.
@@ -94,15 +87,6 @@ fn carried_values(array: &ArrayRef) -> ArrayRef {
     found.or_else(|| Some(Arc::new(StringArray::from(texts(values)?)))).unwrap_or_else(|| array.clone())
 }
 
-/// What a table of cases may say elsewhere and all rows share here.
-fn elsewhere(name: &str) -> Option<&'static str> {
-    match name {
-        "models" => Some("give the argument `models`, which holds for all rows"),
-        "rate_hz" => Some("leave it out: rows run exactly, without samples"),
-        _ => None,
-    }
-}
-
 /// A note on columns of numbers that are repeated although they look like quantities of a case.
 fn looks_like_a_quantity(name: &str, array: &dyn Array) -> Option<String> {
     const WORDS: [&str; 8] = ["speed", "gap", "accel", "decel", "headway", "lateral", "length", "width"];
@@ -132,8 +116,11 @@ fn carried(batch: &RecordBatch, outcome: &Schema) -> Result<Vec<(String, ArrayRe
                 "rename it, or leave it out",
             ));
         }
-        if let Some(help) = elsewhere(name) {
-            return Err(of_column(name, "a row cannot choose it here".to_owned(), help));
+        let refuse = |help| Err(of_column(name, "a row cannot choose it here".to_owned(), help));
+        match name.as_str() {
+            "models" => return refuse("give the argument `models`, which holds for all rows"),
+            "rate_hz" => return refuse("leave it out: rows run exactly, without samples"),
+            _ => {}
         }
         let known = NamedNumber::names();
         if name != "id"
@@ -160,11 +147,11 @@ fn rows_of(
     for (field, array) in batch.schema_ref().fields().iter().zip(batch.columns()) {
         let name = field.name().as_str();
         let place = |at: usize| Place::item(format!("row {}", first_row + at as u64)).column(name);
+        let of_type =
+            |expected: &str| of_column(name, format!("holds values of the type {}", array.data_type()), expected);
         if name == "id" {
             let as_texts = || Some(numbers(array.as_ref())?.into_iter().map(|id| Some(id?.to_string())).collect());
-            let found = texts(array.as_ref()).or_else(as_texts).ok_or_else(|| {
-                of_column(name, format!("holds values of the type {}", array.data_type()), "expected texts or numbers")
-            })?;
+            let found = texts(array.as_ref()).or_else(as_texts).ok_or_else(|| of_type("expected texts or numbers"))?;
             for (at, id) in found.into_iter().enumerate().filter_map(|(at, id)| Some((at, id?))) {
                 if let Some(first) = ids.insert(id, first_row + at as u64) {
                     let problem = format!("this id belongs to row {first} too, but every case needs its own id");
@@ -173,34 +160,27 @@ fn rows_of(
             }
             continue;
         }
-        if name == "category" && category.is_some() {
-            return Err(of_column(name, "the argument `category` is given too".to_owned(), "leave out one of the two"));
-        }
         if name == "category" {
-            let found = texts(array.as_ref()).ok_or_else(|| {
-                of_column(
-                    name,
-                    format!("holds values of the type {}", array.data_type()),
-                    "expected texts: cut-in, cut-out or lvd",
-                )
-            })?;
+            if category.is_some() {
+                let problem = "the argument `category` is given too".to_owned();
+                return Err(of_column(name, problem, "leave out one of the two"));
+            }
+            let found = texts(array.as_ref()).ok_or_else(|| of_type("expected texts: cut-in, cut-out or lvd"))?;
             rows.iter_mut().zip(found).for_each(|(row, text)| row.category = text);
             continue;
         }
-        let found = NamedNumber::find(name).map_err(|error| match error {
-            Error::Usage { problem, help, .. } => of_column(name, problem, &help),
+        let at_place = |place: Place, error: Error| match error {
+            Error::Usage { problem, help, .. } => Error::input(place, problem, help),
             other => other,
-        });
+        };
+        let found = NamedNumber::find(name).map_err(|error| at_place(Place::default().column(name), error));
         // The result repeats other columns.
         let Some(number) = found? else { continue };
         if let Some(other) = seen.insert(number.key(), name) {
             return Err(of_column(name, format!("column `{other}` says the same"), "leave out one of the two"));
         }
         let set = |(at, row, written): (usize, &mut CaseParameters, Written<'_>)| {
-            number.set(row, written).map_err(|error| match error {
-                Error::Usage { problem, help, .. } => Error::input(place(at), problem, help),
-                other => other,
-            })
+            number.set(row, written).map_err(|error| at_place(place(at), error))
         };
         if let Some(values) = numbers(array.as_ref()) {
             for (at, (row, value)) in rows.iter_mut().zip(values).enumerate() {
@@ -218,8 +198,7 @@ fn rows_of(
                 text.map_or(Ok(()), |text| set((at, row, Written::Text(&text))))?;
             }
         } else {
-            let problem = format!("holds values of the type {}", array.data_type());
-            return Err(of_column(name, problem, "expected numbers, or texts with units"));
+            return Err(of_type("expected numbers, or texts with units"));
         }
     }
     Ok(rows)
@@ -253,45 +232,52 @@ pub fn headway_of(text: &str) -> Result<Headway> {
     })
 }
 
-#[allow(clippy::too_many_arguments)] // as `simulate`
-fn options(
+/// The model of a name.
+pub fn model_of(name: &str) -> Result<ModelId> {
+    let names = ModelId::ALL.map(ModelId::name);
+    let unknown = || Error::unknown(Place::option("models"), "driver model", name, names, ", or a Driver");
+    ModelId::parse(name).ok_or_else(unknown)
+}
+
+/// The keyword arguments of `lanesweep.simulate`.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Arguments {
     category: Option<String>,
-    models: &[String],
-    thw: &[String],
-    profile: &str,
+    models: Vec<String>,
+    thw: Vec<String>,
+    profile: String,
     dt: Option<f64>,
-    backend: &str,
-    device: Option<&str>,
+    backend: String,
+    device: Option<String>,
     reference: bool,
     accept_implausible: bool,
-) -> Result<Options> {
-    let mut profile = Profile::load(profile)?;
-    if let Some(dt_s) = dt {
-        profile = profile.with_dt(dt_s)?;
-    }
-    let model = |name: &String| {
-        ModelId::parse(name).ok_or_else(|| {
-            let problem = format!("there is no driver model `{name}`");
-            Error::usage(Place::option("models"), problem, format!("use one of {}, or a Driver", ModelId::names()))
-        })
-    };
-    let models: Vec<ModelId> = models.iter().map(model).collect::<Result<_>>()?;
-    let opened = match reference {
-        true if backend == "gpu" || device.is_some() => {
-            let problem = "binary64 runs on the CPU";
-            return Err(Error::usage(Place::option("reference"), problem, "leave out the device, or `reference`"));
+}
+
+impl Arguments {
+    fn options(self) -> Result<Options> {
+        let mut profile = Profile::load(&self.profile)?;
+        if let Some(dt_s) = self.dt {
+            profile = profile.with_dt(dt_s)?;
         }
-        true => OpenBackend::reference(),
-        false => OpenBackend::open(backend.parse()?, device)?,
-    };
-    Ok(Options {
-        category,
-        models: if models.is_empty() { ModelId::ALL.to_vec() } else { models },
-        headways: thw.iter().map(|text| headway_of(text)).collect::<Result<_>>()?,
-        profile,
-        backend: opened.with_cancel(embedded::token()),
-        implausible: if accept_implausible { Implausible::Accepted } else { Implausible::Refused },
-    })
+        let models = self.models.iter().map(|name| model_of(name)).collect::<Result<Vec<_>>>()?;
+        let opened = match self.reference {
+            true if self.backend == "gpu" || self.device.is_some() => {
+                let problem = "binary64 runs on the CPU";
+                return Err(Error::usage(Place::option("reference"), problem, "leave out the device, or `reference`"));
+            }
+            true => OpenBackend::reference(),
+            false => OpenBackend::open(self.backend.parse()?, self.device.as_deref())?,
+        };
+        Ok(Options {
+            category: self.category,
+            models: if models.is_empty() { ModelId::ALL.to_vec() } else { models },
+            headways: self.thw.iter().map(|text| headway_of(text)).collect::<Result<_>>()?,
+            profile,
+            backend: opened.with_cancel(embedded::token()),
+            implausible: if self.accept_implausible { Implausible::Accepted } else { Implausible::Refused },
+        })
+    }
 }
 
 /// Appends the outcomes of some cases; returns notes about their values.
@@ -312,20 +298,11 @@ fn run(rows: Vec<CaseParameters>, first_row: u64, options: &Options, to: &mut Ar
 
 /// Runs a table of concrete cases. See `lanesweep.simulate`.
 #[pyfunction]
-#[pyo3(signature = (cases, *, category, models, thw, profile, dt, backend, device, reference, accept_implausible, on_message=None))]
-#[allow(clippy::too_many_arguments)] // keyword arguments of the Python function
+#[pyo3(signature = (cases, arguments, on_message=None))]
 pub fn simulate(
     py: Python<'_>,
     cases: &Bound<'_, PyAny>,
-    category: Option<String>,
-    models: Vec<String>,
-    thw: Vec<String>,
-    profile: String,
-    dt: Option<f64>,
-    backend: String,
-    device: Option<String>,
-    reference: bool,
-    accept_implausible: bool,
+    arguments: Arguments,
     on_message: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<(Frame, Vec<String>)> {
     let stream = stream_of(cases)?;
@@ -334,10 +311,8 @@ pub fn simulate(
         .map_err(|error| input_error(format!("the table cannot be read: {error}")))?;
     watched(py, None, on_message, move || {
         embedded::exclusively(|| {
-            let device = device.as_deref();
-            let options =
-                options(category, &models, &thw, &profile, dt, &backend, device, reference, accept_implausible)?;
-            let value = if reference { ColumnKind::Binary64 } else { ColumnKind::Binary32 };
+            let value = if arguments.reference { ColumnKind::Binary64 } else { ColumnKind::Binary32 };
+            let options = arguments.options()?;
             let mut rows = ArrowRows::new(&case_columns(value), HashMap::new());
             let outcome = rows.schema();
             let mut schema = outcome.clone();

@@ -32,6 +32,13 @@ pub fn is_calling() -> bool {
     IS_CALLING.get()
 }
 
+fn calling<T>(work: impl FnOnce() -> T) -> T {
+    IS_CALLING.set(true);
+    let done = work();
+    IS_CALLING.set(false);
+    done
+}
+
 pub fn take_exception() -> Option<PyErr> {
     RAISED.lock().unwrap_or_else(PoisonError::into_inner).take()
 }
@@ -158,10 +165,9 @@ impl Compiled {
         let LaneColumns { step, dt_s, stride, rows, state, .. } = columns;
         let (lanes, stride) = (decided.len() as i64, *stride as i64);
         let (view, state, parameters) = (rows.as_ptr(), state.as_mut_ptr(), self.parameters.as_ptr());
-        IS_CALLING.set(true);
+        let (step, to) = ((*step).into(), decided.as_mut_ptr());
         // SAFETY: whoever gives the function promises that it reads and writes what `Driver.compiled` says.
-        unsafe { (self.function)(lanes, stride, (*step).into(), *dt_s, view, state, parameters, decided.as_mut_ptr()) };
-        IS_CALLING.set(false);
+        calling(|| unsafe { (self.function)(lanes, stride, step, *dt_s, view, state, parameters, to) });
     }
 }
 
@@ -188,14 +194,8 @@ fn compare(name: &str, columns: &LaneColumns, decided: &[f32], expected: &[f32],
 
 /// Calls Python, unless the interpreter is ending.
 fn attached<T>(work: impl for<'py> FnOnce(Python<'py>) -> Result<T>) -> Result<T> {
-    let work = |py: Python<'_>| {
-        IS_CALLING.set(true);
-        let done = work(py);
-        IS_CALLING.set(false);
-        done
-    };
     let ending = || Error::Interrupted { done: "the interpreter ends".to_owned(), is_kept: false };
-    Python::try_attach(work).unwrap_or_else(|| Err(ending()))
+    Python::try_attach(|py| calling(|| work(py))).unwrap_or_else(|| Err(ending()))
 }
 
 /// Registers a driver; `compiled` is the address of its function, with parameters, the number of rows of its state, and

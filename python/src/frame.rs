@@ -20,7 +20,7 @@ use pyo3::exceptions::{PyKeyError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyBytes, PyCapsule, PyDict, PyFloat, PyList};
 
-use crate::error::{InternalError, input_error};
+use crate::error::{exception, input_error};
 
 const STREAM: &std::ffi::CStr = c"arrow_array_stream";
 
@@ -48,7 +48,7 @@ impl Frame {
 }
 
 fn failed(error: ArrowError) -> PyErr {
-    InternalError::new_err(format!("a table: {error}"))
+    Python::attach(|py| exception(py, &lanesweep::Error::Internal(format!("a table: {error}"))))
 }
 
 /// A cell for readers.

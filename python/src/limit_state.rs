@@ -19,7 +19,7 @@ use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-use crate::cases::headway_of;
+use crate::cases::{headway_of, model_of};
 use crate::error::exception;
 use crate::verb::watched;
 
@@ -53,34 +53,34 @@ struct Opened {
 #[pyclass(frozen, subclass, module = "lanesweep._core")]
 pub struct LimitState(Arc<Opened>);
 
-fn open(
+/// The arguments of `lanesweep.LimitState`.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct Arguments {
     density: PathBuf,
-    model: &str,
-    criterion: &str,
+    model: String,
+    criterion: String,
     thw: Option<String>,
-    profile: &str,
-    backend: &str,
-    device: Option<&str>,
-) -> Result<Opened> {
-    let density = read_density(&density)?;
-    let model = ModelId::parse(model).ok_or_else(|| {
-        let problem = format!("there is no driver model `{model}`");
-        Error::usage(Place::option("models"), problem, format!("use one of {}, or a Driver", ModelId::names()))
-    })?;
-    let criterion = Criterion::parse(criterion).ok_or_else(|| {
-        let problem = format!("there is no criterion `{criterion}`");
-        Error::usage(Place::option("criterion"), problem, "use collision, ttc or btn")
-    })?;
-    let headway = match thw {
-        None => SampleHeadways::Sampled,
-        Some(text) => SampleHeadways::Each(vec![headway_of(&text)?]),
+    profile: String,
+    backend: String,
+    device: Option<String>,
+}
+
+fn open(arguments: &Arguments) -> Result<Opened> {
+    let unknown = || {
+        let keys = Criterion::ALL.map(Criterion::key);
+        Error::unknown(Place::option("criterion"), "criterion", &arguments.criterion, keys, "")
     };
-    let backend = OpenBackend::open(backend.parse()?, device)?;
+    let headway = match &arguments.thw {
+        None => SampleHeadways::Sampled,
+        Some(text) => SampleHeadways::Each(vec![headway_of(text)?]),
+    };
+    let backend = OpenBackend::open(arguments.backend.parse()?, arguments.device.as_deref())?;
     let opened = Opened {
-        density,
-        profile: Profile::load(profile)?,
-        model,
-        criterion,
+        density: read_density(&arguments.density)?,
+        profile: Profile::load(&arguments.profile)?,
+        model: model_of(&arguments.model)?,
+        criterion: Criterion::parse(&arguments.criterion).ok_or_else(unknown)?,
         headway,
         backend: backend.with_cancel(embedded::token()),
     };
@@ -99,14 +99,12 @@ impl Opened {
     }
 
     /// The limit state of valid points; infinite elsewhere.
-    fn values_or_infinite(&self, points: Vec<Vec<f64>>) -> Result<Vec<f64>> {
-        let is_valid: Vec<bool> = points.iter().map(|point| self.density.space.is_valid(point)).collect();
-        let valid = points.into_iter().zip(&is_valid).filter_map(|(point, is_valid)| is_valid.then_some(point));
-        let valid: Vec<Vec<f64>> = valid.collect();
-        let found = if valid.is_empty() { Vec::new() } else { self.values(&valid)? };
-        let mut found = found.into_iter();
-        let value = |is_valid: bool| if is_valid { found.next() } else { None }.unwrap_or(f64::INFINITY);
-        Ok(is_valid.into_iter().map(value).collect())
+    fn values_or_infinite(&self, points: &[Vec<f64>]) -> Result<Vec<f64>> {
+        let is_valid = |point: &Vec<f64>| self.density.space.is_valid(point);
+        let valid: Vec<Vec<f64>> = points.iter().filter(|point| is_valid(point)).cloned().collect();
+        let mut found = if valid.is_empty() { Vec::new() } else { self.values(&valid)? }.into_iter();
+        let value = |point| if is_valid(point) { found.next() } else { None }.unwrap_or(f64::INFINITY);
+        Ok(points.iter().map(value).collect())
     }
 
     fn values(&self, points: &[Vec<f64>]) -> Result<Vec<f64>> {
@@ -126,21 +124,8 @@ impl Opened {
 #[pymethods]
 impl LimitState {
     #[new]
-    #[pyo3(signature = (density, *, model, criterion, thw, profile, backend, device))]
-    #[allow(clippy::too_many_arguments)] // keyword arguments of the Python class
-    fn new(
-        py: Python<'_>,
-        density: PathBuf,
-        model: String,
-        criterion: String,
-        thw: Option<String>,
-        profile: String,
-        backend: String,
-        device: Option<String>,
-    ) -> PyResult<LimitState> {
-        let work = move || {
-            embedded::exclusively(|| open(density, &model, &criterion, thw, &profile, &backend, device.as_deref()))
-        };
+    fn new(py: Python<'_>, arguments: Arguments) -> PyResult<LimitState> {
+        let work = move || embedded::exclusively(|| open(&arguments));
         Ok(LimitState(Arc::new(watched(py, None, None, work)?)))
     }
 
@@ -210,7 +195,7 @@ impl LimitState {
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let points = self.rows(py, &points)?;
         let opened = self.0.clone();
-        let values = watched(py, None, None, move || embedded::exclusively(|| opened.values_or_infinite(points)))?;
+        let values = watched(py, None, None, move || embedded::exclusively(|| opened.values_or_infinite(&points)))?;
         Ok(PyArray1::from_vec(py, values))
     }
 
@@ -253,7 +238,7 @@ impl LimitState {
         }
         let opened = self.0.clone();
         watched(py, None, None, move || {
-            let fails: Vec<bool> = embedded::exclusively(|| opened.values_or_infinite(points.clone()))?
+            let fails: Vec<bool> = embedded::exclusively(|| opened.values_or_infinite(&points))?
                 .iter()
                 .map(|value| *value <= 0.0)
                 .collect();

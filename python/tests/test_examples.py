@@ -14,8 +14,8 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
 def test_an_autoencoder_goes_through_external_s_prime(scenarios: Path, tmp_path: Path) -> None:
-    command = [sys.executable, str(EXAMPLES / "autoencoder.py"), str(scenarios)]
-    command += ["--category", "lvd", "--size", "3", "--out", str(tmp_path)]
+    command = [sys.executable, str(EXAMPLES / "autoencoder.py"), str(scenarios.parent / "recordings")]
+    command += ["--category", "lvd", "--size", "3", "--out", str(tmp_path / "study")]
     subprocess.run(command, check=True, capture_output=True, cwd=tmp_path)
     with (tmp_path / "study" / "results.csv").open(encoding="utf-8") as lines:
         scores = [(row["variant"], float(row["f1"])) for row in csv.DictReader(lines) if row["headway"] == "all" and row["f1"]]

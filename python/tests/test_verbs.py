@@ -45,6 +45,18 @@ def test_lists_have_what_the_verbs_take() -> None:
     assert {"cut-in-2", "cut-out-g", "lvd-ii"} <= options.PARAMETERIZATIONS.keys()
     assert all(lanesweep.profile(name) for name in options.PROFILES)
     assert "time step" in options.KEYS["run.dt_s"].lower()
+    assert all(name in options.KEYS["run.profile"] for name in options.PROFILES)
+
+
+def test_mined_scenarios_are_a_table_without_a_file(scenarios) -> None:
+    mined = lanesweep.mine(scenarios.parent / "recordings").table("scenarios").to_polars()
+    read = [json.loads(line) for line in scenarios.read_text().splitlines()]
+    for name in ("id", "kept", "gap0", "lane_width", "peak_decel"):
+        assert mined[name].to_list() == [one.get(name) for one in read]
+    assert mined["target_v"].to_list() == [one["target"]["v"] for one in read]
+    options = {"categories": "cut-in", "models": "FSM", "thw": 1.2}
+    found = [lanesweep.study(scenarios=of, **options).table("results").to_polars() for of in (mined, scenarios)]
+    assert found[0].equals(found[1])
 
 
 def test_a_study_has_the_bytes_of_the_command_line(program, scenarios, tmp_path) -> None:
@@ -134,6 +146,7 @@ def test_every_table_of_every_verb_opens_with_one_schema_whatever_its_values(sce
         # Without and with failures, without and with intervals, of some categories.
         "study": [lambda: lanesweep.study(scenarios=scenarios), lambda: lanesweep.study(scenarios=scenarios, models="FSM", thw=9, categories="cut-in")],
         "sample": [lambda: lanesweep.sample(density, samples=10, thw=9, models="FSM"), lambda: lanesweep.sample(density, samples=3000, thw=0.4)],
+        "mine": [lambda: lanesweep.mine(scenarios.parent / "recordings"), lambda: lanesweep.mine(scenarios.parent / "recordings", kept=True)],
         "map": [lambda: lanesweep.map("lvd", y="ego_speed_kmh=60,90", **grid), lambda: lanesweep.map("lvd", y="ego_speed_kmh=60", **grid)],
     }
     for verb, made in calls.items():
@@ -146,7 +159,8 @@ def test_every_table_of_every_verb_opens_with_one_schema_whatever_its_values(sce
                 arrow = pa.table(frame)
                 assert schemas.setdefault(name, arrow.schema).equals(arrow.schema, check_metadata=True), (verb, name)
                 assert arrow.num_rows == len(frame) == len(frame.to_pandas()) == len(frame.to_polars())
-                numbers = [field.name for field in arrow.schema if pa.types.is_floating(field.type) or pa.types.is_integer(field.type)]
+                kinds = {of.name: of.type.value_type if pa.types.is_list(of.type) else of.type for of in arrow.schema}
+                numbers = [of for of, kind in kinds.items() if pa.types.is_floating(kind) or pa.types.is_integer(kind)]
                 assert set(frame.units) == set(numbers), (verb, name)
                 texts = [column.to_pylist() for column in arrow.columns if pa.types.is_string(column.type)]
                 assert not any(str(text).startswith(("{", "[")) for column in texts for text in column), (verb, name)

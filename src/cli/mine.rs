@@ -7,7 +7,9 @@ use clap::Args;
 use super::configured::Configured;
 use super::source::{self, PlausibilityFlag, PresetFlag};
 use super::{Exit, Output, console};
-use lanesweep_model::scenario::{DataProvenance, check_scenario_file, write_scenarios, write_scenarios_to};
+use lanesweep_model::scenario::{
+    DataProvenance, check_scenario_file, scenario_table, write_scenarios, write_scenarios_to,
+};
 use lanesweep_support::Result;
 use lanesweep_support::files::check_output;
 use lanesweep_support::input_file;
@@ -75,6 +77,10 @@ impl Mine {
             }
         }
         let exit = if collection.problems.is_empty() { Exit::Ok } else { Exit::Incomplete };
-        Ok(exit.into())
+        let mut output = Output::from(exit);
+        if console::is_captured() {
+            output.tables.push(("scenarios".to_owned(), scenario_table(&collection.scenarios)?));
+        }
+        Ok(output)
     }
 }

@@ -36,13 +36,12 @@ class Description(NamedTuple):
 def fit_description(scenarios: Any, size: int, emphasis: npt.ArrayLike | None = None) -> Description:
     """Decompose scenarios of one category (singular values) with weights times exp(emphasis): 4 knots per series, one per number."""
     rows = table(scenarios, "category", "target_v", "fps")
-    return _fit(_vectors(rows), _category(rows), size, emphasis)
+    return _fit(vectors(rows), _category(rows), size, emphasis)
 
 
 def replayed(description: Description, scenarios: Any) -> pl.DataFrame:
     """Return scenarios as the description keeps them: an S' for `study(external=…)`."""
-    rows = table(scenarios, "category", "target_v", "fps")
-    return _scenarios(rows, _decoded(description, _vectors(rows)))
+    return of_vectors(_decoded(description, vectors(scenarios)), scenarios)
 
 
 def found_emphasis(
@@ -57,10 +56,9 @@ def found_emphasis(
         import cma
     check_names([criterion], ["collision", "ttc", "btn"], "criterion")
     rows = table(scenarios, "category", "target_v", "fps")
-    z, category = _vectors(rows), _category(rows)
+    z, category = vectors(rows), _category(rows)
     series, numbers = _LAYOUT[category]
-    data: Any = rows
-    folds = table(_verbs.study(scenarios=data).table("folds"))
+    folds = table(_verbs.study(scenarios=rows).table("folds"))
     fold = rows.join(folds, on="id", how="left", maintain_order="left")["fold"].to_numpy()
     start = [0.0] * (KNOTS * len(series) + len(numbers))
     search = cma.CMAEvolutionStrategy(start, 0.7, {"popsize": 12, "seed": seed, "bounds": [-8, 8], "verbose": -9})
@@ -72,7 +70,7 @@ def found_emphasis(
             for one in np.unique(fold):
                 is_own = fold == one
                 decoded[at, is_own] = _decoded(_fit(z[~is_own], category, size, point), z[is_own])
-        scores = _scores(rows, {f"p{at}": _scenarios(rows, of) for at, of in enumerate(decoded)}, criterion)
+        scores = _scores(rows, {f"p{at}": of_vectors(of, rows) for at, of in enumerate(decoded)}, criterion)
         search.tell(points, [1.0 - score for score in scores])
         if max(scores) > best[1]:
             best = (np.asarray(points[int(np.argmax(scores))]), max(scores))
@@ -110,8 +108,9 @@ def _category(rows: pl.DataFrame) -> str:
     return str(found[0])
 
 
-def _scenarios(rows: pl.DataFrame, z: Array) -> pl.DataFrame:
-    """The scenarios of vectors, with sizes and sides of the rows."""
+def of_vectors(z: Array, scenarios: Any) -> pl.DataFrame:
+    """Return the scenarios of `vectors` that were changed, with the sizes and sides of the scenarios: an S' for `study(external=…)`."""
+    rows = table(scenarios, "category", "target_v", "fps")
     category = _category(rows)
     series, numbers = _LAYOUT[category]
     found = {name: z[:, INSTANTS * at : INSTANTS * (at + 1)] for at, name in enumerate(series)}
@@ -130,10 +129,9 @@ def _scenarios(rows: pl.DataFrame, z: Array) -> pl.DataFrame:
 
 def _scores(rows: pl.DataFrame, described: Mapping[str, pl.DataFrame], criterion: Criterion) -> list[float]:
     """Mean F1 of every S' over the drivers for which S fails in ten scenarios."""
-    data: Any = rows
     # A bad proposal jumps sideways, and is scored all the same.
     with quiet():
-        study = _verbs.study(scenarios=data, external=described, accept_implausible=True, config={"study": {"folds": 1}})
+        study = _verbs.study(scenarios=rows, external=described, accept_implausible=True, config={"study": {"folds": 1}})
     judged = table(study.table("results")).filter((pl.col("criterion") == criterion) & (pl.col("failing_scenarios") >= 10))
     if judged.is_empty():
         raise InputError(f"no driver fails in ten of these scenarios ({criterion})\n  help: give more scenarios, or another criterion")
@@ -142,8 +140,9 @@ def _scores(rows: pl.DataFrame, described: Mapping[str, pl.DataFrame], criterion
     return [float(by_name[name]) for name in described]
 
 
-def _vectors(rows: pl.DataFrame) -> Array:
-    """Series at equidistant instants of [0, T], then the numbers, a row per scenario."""
+def vectors(scenarios: Any) -> Array:
+    """Return scenarios of one category as vectors, a row each: the series at 50 equidistant instants, then speed, gap and duration."""
+    rows = table(scenarios, "category", "target_v", "fps")
     series, numbers = _LAYOUT[_category(rows)]
 
     def sampled(values: list[float]) -> Array:

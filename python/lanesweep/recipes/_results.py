@@ -80,14 +80,14 @@ def compare_results(
     # What equals a tolerance is not beyond it, whatever its last bits.
     beyond = [pl.when(pl.col(name).abs().round(4) > by).then(pl.lit(name)) for name, by in most.items()]
     compared = compared.with_columns(first=pl.coalesce(beyond))
-    of = [(name, compared.filter(first=name)[name]) for name in most]
-    causes = {"quantity": [name for name, _ in of], "cases": [len(by) for _, by in of]}
-    causes |= {what: [getattr(by, what)() for _, by in of] for what in ("median", "min", "max")}
-    ordered = pl.DataFrame(causes).filter(pl.col("cases") > 0).sort("cases", descending=True, maintain_order=True)
+    found = compared.unpivot(index="first", on=list(most), variable_name="quantity").filter(pl.col("first") == pl.col("quantity"))
+    value = pl.col("value")
+    causes = found.group_by("quantity", maintain_order=True).agg(cases=pl.len(), median=value.median(), min=value.min(), max=value.max())
+    causes = causes.sort("cases", descending=True, maintain_order=True)
     agreeing, judged = compared.filter(collision=0.0).height, compared["collision"].count()
     low, high = proportion_confint(agreeing, judged, method="beta")
     ignored = [name for name in given.columns if name not in ("id", *most)]
-    return Comparison(compared, ordered, (agreeing / judged, low, high), own.height - judged, ignored)
+    return Comparison(compared, causes, (agreeing / judged, low, high), own.height - judged, ignored)
 
 
 def _lanes(cases: pl.DataFrame, columns: list[str], model: str, profile: PathLike) -> pl.DataFrame:

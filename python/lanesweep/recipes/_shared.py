@@ -8,7 +8,6 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -64,10 +63,9 @@ def table(rows: Any, *needs: str, may_be_empty: bool = False) -> pl.DataFrame:
     """
     if isinstance(rows, (str, os.PathLike)):
         path = Path(rows)
-        readers = {".csv": partial(pl.read_csv, infer_schema_length=None), ".jsonl": partial(pl.read_ndjson, infer_schema_length=None)}
-        readers[".parquet"] = partial(pl.read_parquet)
+        readers: dict[str, Any] = {".csv": pl.read_csv, ".jsonl": pl.read_ndjson, ".parquet": pl.read_parquet}
         check_names([path.suffix], readers, f"reader of {path}:")
-        rows = readers[path.suffix](path)
+        rows = readers[path.suffix](path, **({} if path.suffix == ".parquet" else {"infer_schema_length": None}))
     found = pl.DataFrame(dict(rows) if isinstance(rows, Mapping) else rows, strict=False).unnest(select.struct(), separator="_")
     check_names(needs, found.columns, "column")
     if found.is_empty() and not may_be_empty:

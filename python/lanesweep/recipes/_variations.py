@@ -62,13 +62,12 @@ def _places(size: int, inside: int, edge: int, outside: int, seed: int) -> Point
         from scipy.stats import qmc
     count = inside + edge + outside
     points = qmc.Sobol(size + 1, rng=seed).random_base2(max(count - 1, 0).bit_length())[:count]
-    places, last = points[:, :size], points[:, size]
-    for row in range(inside, count):
-        is_edge = row < inside + edge
-        at = row - inside - (0 if is_edge else edge)
-        # From a tenth of the way, so that rounding does not lead back.
-        beyond = 0.0 if is_edge else 0.25 * (0.1 + 0.9 * last[row])
-        places[row, at % size] = -beyond if at // size % 2 == 0 else 1.0 + beyond
+    places, last = points[:, :size], points[inside:, size]
+    row = np.arange(edge + outside)
+    at = np.where(row < edge, row, row - edge)
+    # From a tenth of the way, so that rounding does not lead back.
+    beyond = np.where(row < edge, 0.0, 0.25 * (0.1 + 0.9 * last))
+    places[inside + row, at % size] = np.where(at // size % 2 == 0, -beyond, 1.0 + beyond)
     return np.asarray(places)
 
 

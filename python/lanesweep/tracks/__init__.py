@@ -27,10 +27,8 @@ from .._result import Result
 if find_spec("polars") is None:
     raise ImportError("polars is missing: pip install 'lanesweep[tracks]'", name="polars")
 
-from ._automatum import automatum
 from ._commonroad import commonroad
-from ._i24 import i24
-from ._lists import lists, swiftraj
+from ._lists import automatum, i24, lists, swiftraj
 from ._sumo import sumo
 
 __all__ = ["automatum", "commonroad", "i24", "lists", "sumo", "swiftraj"]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import numpy.typing as npt
 import polars as pl
@@ -77,8 +75,7 @@ def commonroad(path: File) -> pl.DataFrame:
     step_s = number(path, "`timeStepSize` of the root", root.get("timeStepSize"), above=0)
     warn_left_out(path, frame.filter(pl.col("length_m").is_null())["vehicle_id"], "sizes, of other shapes than rectangles,")
     lane = _lanes(frame["x_m"].to_numpy()[:, None], frame["y_m"].to_numpy()[:, None], lanelets)
-    turned = pl.col("heading_deg") * (180.0 / math.pi)
-    return canonical(path, frame.with_columns(turned, time_s=pl.col("frame") * step_s, lane=pl.Series(lane, dtype=pl.String)))
+    return canonical(path, frame.with_columns(pl.col("heading_deg").degrees(), time_s=pl.col("frame") * step_s, lane=pl.Series(lane, dtype=pl.String)))
 
 
 def _lanes(x: npt.NDArray[np.float64], y: npt.NDArray[np.float64], lanelets: dict[str, npt.NDArray[np.float64]]) -> list[str | None]:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
-from itertools import islice
 
 import polars as pl
 
@@ -88,7 +86,7 @@ def sumo(fcd: File, types: File | Iterable[File] = ()) -> pl.DataFrame:
         raise bad(fcd, place, problem, "give the files that define it: sumo(FCD, [FILE.rou.xml, FILE.add.xml])")
     length, width = (pl.col("class").replace_strict({name: of[at] for name, of in kinds.items()}) for at in (0, 1))
     kind = {name: "truck" if of[2].lower().startswith(_TRUCKS) else of[2] for name, of in kinds.items()}
-    angle = pl.col("heading_deg") * (math.pi / 180.0)
+    angle = pl.col("heading_deg").radians()
     frame = frame.with_columns(
         x_m=pl.col("x_m") - length / 2.0 * angle.sin(),
         y_m=pl.col("y_m") - length / 2.0 * angle.cos(),
@@ -128,9 +126,7 @@ def _types(files: File | Iterable[File]) -> dict[str, _Type]:
 def _samples(fcd: File) -> pl.DataFrame:
     """Vehicles and times, in our columns; classes are names of types, headings are SUMO's angles."""
     if os.fspath(fcd).removesuffix(".gz").endswith(".xml"):
-        rows, schema = _vehicles(fcd), dict.fromkeys(_NAMES, pl.String)
-        batches = iter(lambda: list(islice(rows, 100_000)), [])
-        frame = pl.concat([pl.DataFrame(schema=schema), *(pl.DataFrame(batch, schema, orient="row") for batch in batches)])
+        frame = pl.DataFrame(_vehicles(fcd), dict.fromkeys(_NAMES, pl.String), orient="row")
     else:
         frame = read_table(fcd)
         for tag in ("person", "container"):

@@ -22,13 +22,13 @@ from ..options import Path as File
 LOG = logging.getLogger("lanesweep")
 #: Errors of a compressed file that ends early.
 _BROKEN = (EOFError, zlib.error, gzip.BadGzipFile)
-_TEXTS = ("vehicle_id", "class", "lane")
-#: The columns in their order.
-COLUMNS = (
-    *("vehicle_id", "frame", "time_s", "x_m", "y_m", "s_m", "d_m", "heading_deg", "speed_mps", "vx_mps", "vy_mps"),
-    *("forward_speed_mps", "leftward_speed_mps", "acceleration_mps2", "ax_mps2", "ay_mps2", "length_m", "width_m"),
-    *("class", "lane", "direction"),
+#: The columns in their order, with their types.
+COLUMNS: dict[str, Any] = dict.fromkeys(
+    "vehicle_id frame time_s x_m y_m s_m d_m heading_deg speed_mps vx_mps vy_mps forward_speed_mps leftward_speed_mps "
+    "acceleration_mps2 ax_mps2 ay_mps2 length_m width_m class lane direction".split(),
+    pl.Float64,
 )
+COLUMNS |= {"vehicle_id": pl.String, "frame": pl.Int64, "class": pl.String, "lane": pl.String}
 
 
 def bad(path: File, place: str, problem: str, help: str) -> InputError:
@@ -91,9 +91,10 @@ def elements(path: File, *tags: str) -> Iterator[ET.Element]:
             raise bad(path, place, f"not well-formed XML, or truncated ({error})", "export the file again") from None
 
 
-def json_vehicles(path: File, key: str = "") -> list[dict[str, Any]]:
-    """Objects of a JSON list, of the list under a key, or one object per line; numbers stay texts."""
-    decoder = json.JSONDecoder(parse_float=str, parse_int=str, parse_constant=str)
+def _objects(path: File, key: str) -> list[dict[str, Any]]:
+    """Objects of a JSON list, of the list under a key, or one object per line; numbers stay texts, ids of MongoDB become texts."""
+    plain: dict[str, Any] = {"parse_float": str, "parse_int": str, "parse_constant": str}
+    decoder = json.JSONDecoder(**plain, object_hook=lambda found: found.get("$oid", found))
     found: list[dict[str, Any]] = []
     try:
         with opened(path) as file:
@@ -112,28 +113,9 @@ def json_vehicles(path: File, key: str = "") -> list[dict[str, Any]]:
     return found
 
 
-def unpacked(path: File, vehicles: pl.DataFrame, columns: Mapping[str, str], there: Iterable[str] = ()) -> pl.DataFrame:
-    """A row per item of the lists of the vehicles; `columns` has our names by theirs, which are among those that are `there`."""
-    for theirs in columns:
-        if theirs not in vehicles.columns:
-            problem = f"not there; the file has {', '.join(there or vehicles.columns)}"
-            raise bad(path, f"column `{theirs}`", problem, "check that it has this format")
-    frame = vehicles.select(pl.col(theirs).alias(ours) for theirs, ours in columns.items())
-    frame = frame.with_columns(pl.col(name).arr.to_list() for name, dtype in frame.schema.items() if isinstance(dtype, pl.Array))
-    packed = [name for name, dtype in frame.schema.items() if isinstance(dtype, pl.List)]
-    if not packed:
-        return frame
-    length = frame[packed[0]].list.len()
-    for name in packed[1:]:
-        differs = frame[name].list.len().ne_missing(length)
-        if differs.any():
-            problem = f"the lists of `{packed[0]}` and `{name}` differ in length"
-            raise bad(path, f"vehicle {differs.to_list().index(True) + 1} of the list", problem, "give lists of equal length")
-    return frame.filter(length > 0).explode(packed)
-
-
-def json_lists(path: File, vehicles: list[dict[str, Any]], columns: Mapping[str, str]) -> pl.DataFrame:
-    """The same of vehicles from JSON."""
+def json_lists(path: File, columns: Mapping[str, str], key: str = "") -> pl.DataFrame:
+    """A row per item of the lists of vehicles in JSON, which are in a list under a key, or one per line; `columns` as in `unpacked`."""
+    vehicles = _objects(path, key)
     frame, there = {}, dict.fromkeys(key for vehicle in vehicles for key in vehicle)
     for theirs in [of for of in columns if of in there or not vehicles]:
         cells = [vehicle.get(theirs) for vehicle in vehicles]
@@ -145,15 +127,33 @@ def json_lists(path: File, vehicles: list[dict[str, Any]], columns: Mapping[str,
     return unpacked(path, pl.DataFrame(frame), columns, there)
 
 
+def unpacked(path: File, vehicles: pl.DataFrame, columns: Mapping[str, str], there: Iterable[str] = ()) -> pl.DataFrame:
+    """A row per item of the lists of the vehicles; `columns` has our names by theirs, which are among those that are `there`."""
+    for theirs in columns:
+        if theirs not in vehicles.columns:
+            problem = f"not there; the file has {', '.join(there or vehicles.columns)}"
+            raise bad(path, f"column `{theirs}`", problem, "check that it has this format")
+    frame = vehicles.select(pl.col(theirs).alias(ours) for theirs, ours in columns.items())
+    frame = frame.with_columns(pl.col(name).arr.to_list() for name, dtype in frame.schema.items() if isinstance(dtype, pl.Array))
+    packed = [name for name, dtype in frame.schema.items() if isinstance(dtype, pl.List)]
+    for name in packed[1:]:
+        differs = frame[name].list.len().ne_missing(frame[packed[0]].list.len())
+        if differs.any():
+            problem = f"the lists of `{packed[0]}` and `{name}` differ in length"
+            raise bad(path, f"vehicle {differs.to_list().index(True) + 1} of the list", problem, "give lists of equal length")
+    if packed:
+        frame = frame.filter(pl.col(packed[0]).list.len() > 0).explode(packed)
+    return canonical(path, frame)
+
+
 def canonical(path: File, frame: pl.DataFrame) -> pl.DataFrame:
     """The columns in their order and with their types, NaN as no value; what else is no finite number, or no size, is an error."""
     frame = frame.with_columns(pl.col(pl.Float32, pl.Float64).fill_nan(None))
-    names = [name for name in COLUMNS if name in frame.columns]
-    types = {name: pl.String if name in _TEXTS else pl.Int64 if name == "frame" else pl.Float64 for name in names}
-    table = frame.select(pl.col(name).cast(dtype, strict=False) for name, dtype in types.items())
-    for name in names:
+    types = {name: kind for name, kind in COLUMNS.items() if name in frame.columns}
+    table = frame.select(pl.col(name).cast(kind, strict=False) for name, kind in types.items())
+    for name, kind in types.items():
         is_size, found = name in ("length_m", "width_m"), table[name]
-        is_good = found.is_finite() & (found > (0.0 if is_size else -math.inf)) if types[name] == pl.Float64 else found.is_not_null()
+        is_good = found.is_finite() & (found > (0.0 if is_size else -math.inf)) if kind == pl.Float64 else found.is_not_null()
         wrong = frame.filter(~is_good.fill_null(False) & frame[name].is_not_null())
         if len(wrong):
             place = ", ".join(f"{of} {wrong[of][0]}" for of in ("vehicle_id", "frame", "time_s") if of in wrong.columns)

@@ -7,6 +7,7 @@ use crate::help::{MODELS, RUN};
 use lanesweep_engine::BackendChoice;
 use lanesweep_model::criterion::Criterion;
 use lanesweep_model::driver::Bound;
+use lanesweep_model::profile::Profile;
 use lanesweep_model::scenario::parameterization::{ParameterizationOptions, SvdLateral};
 use lanesweep_run::score::ScoreOptions;
 use lanesweep_stats::density::{BandwidthRule, FitOptions};
@@ -46,6 +47,13 @@ pub(crate) struct Settings {
     pub verify: VerifySettings,
 }
 
+fn profile_help() -> String {
+    let names = Profile::names().collect::<Vec<_>>().join(", ");
+    format!(
+        "{names}. Name of a profile, or a TOML file of your own. `map --preset jrc` takes jrc-2021 unless it is set."
+    )
+}
+
 config_tables! {
     /// Options of every verb.
     pub(crate) struct RunSettings {
@@ -63,8 +71,7 @@ config_tables! {
         #[schemars(extend("x-flag" = "device", "x-verbs" = ON_DEVICES, "x-heading" = RUN))]
         #[schemars(extend("x-value" = "NAME|pci:BUS|INDEX"))]
         pub device: Option<String> = None,
-        /// paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc` takes
-        /// jrc-2021 unless it is set.
+        #[schemars(description = profile_help())]
         #[schemars(extend("x-flag" = "profile", "x-verbs" = SIMULATING, "x-heading" = MODELS, "x-value" = "NAME|FILE"))]
         pub profile: String = "paper".to_owned(),
         /// Time step, s. Without it: the profile's.

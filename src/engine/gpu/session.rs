@@ -80,7 +80,7 @@ struct Piece {
 
 impl<'p> GpuSession<'p> {
     fn new(plan: &'p LanePlan, device: String, commands: Sender<Command>, options: &GpuOptions) -> Result<Self> {
-        ModelId::refuse_foreign(&plan.models, "a device")?;
+        ModelId::refuse_foreign(&plan.models, "a device", &format!("use {}", option("backend = cpu")))?;
         let queue = options.lanes_per_invocation != Some(1);
         let constants: Vec<Constants<f32>> =
             plan.blocks.iter().map(|b| Constants::resolve(&plan.profile, b.category)).collect();

@@ -4,7 +4,7 @@
 use std::sync::{Arc, RwLock};
 
 use super::ModelId;
-use lanesweep_support::{Error, Place, Result, option};
+use lanesweep_support::{Error, Place, Result};
 
 /// Largest magnitude of an acceleration, m/s²: a larger one is an error of the driver.
 pub const MAX_ACCELERATION_MPS2: f32 = 100.0;
@@ -151,17 +151,13 @@ impl ModelId {
     /// Refuses drivers outside the registry where only built-in ones can run.
     ///
     /// # Errors
-    /// [`Error::Usage`] that names the driver and `what` cannot run it.
-    pub fn refuse_foreign(models: &[ModelId], what: &str) -> Result<()> {
+    /// [`Error::Usage`] that names the driver, `what` cannot run it, and what can.
+    pub fn refuse_foreign(models: &[ModelId], what: &str, instead: &str) -> Result<()> {
         match models.iter().find(|model| model.foreign().is_some()) {
             None => Ok(()),
             Some(model) => {
                 let problem = format!("driver {} is a function of this process, which {what} cannot run", model.name());
-                Err(Error::usage(
-                    Place::option("models"),
-                    problem,
-                    format!("use {}, or a built-in model", option("backend = cpu")),
-                ))
+                Err(Error::usage(Place::option("models"), problem, format!("{instead}, or use a built-in model")))
             }
         }
     }

@@ -19,7 +19,7 @@ use super::schema::wrong_field;
 use super::{Scenario, table_reader};
 use crate::plausibility::Implausible;
 use lanesweep_support::atomic_file::AtomicFile;
-use lanesweep_support::table::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter};
+use lanesweep_support::table::{Cell, Column, ColumnKind, Table, TableFormat, TableMetadata, TableWriter};
 use lanesweep_support::{Error, Place, Result, input_file};
 
 /// Formats for writing; the first is the default for names without an ending.
@@ -63,7 +63,12 @@ pub fn write_scenarios<'a>(path: &Path, scenarios: impl IntoIterator<Item = &'a 
         format => {
             let scenarios: Vec<&Scenario> = scenarios.into_iter().collect();
             scenarios.iter().try_for_each(|scenario| check_written(scenario))?;
-            write_table(path, format, &scenarios)
+            let synthetic = scenarios.iter().any(|scenario| scenario.synthetic);
+            let facts = TableMetadata { table: "scenarios", synthetic, ..TableMetadata::default() };
+            let (leaves, columns) = columns();
+            let mut table = TableWriter::create(path, format, columns.clone(), &facts)?;
+            scenarios.iter().try_for_each(|scenario| table.row(&row(scenario, &leaves, &columns)?))?;
+            table.finish()
         }
     }
 }
@@ -76,34 +81,36 @@ pub fn check_scenario_file(path: &Path) -> Result<TableFormat> {
     TableFormat::of(path, &WRITTEN, "the scenario file")
 }
 
-/// The columns of a table of scenarios.
-fn scenario_columns() -> Vec<Column> {
-    leaves().iter().map(Leaf::column).collect()
+/// Scenarios as a table: one row per scenario, series as lists.
+///
+/// # Errors
+/// None for a scenario that can be written.
+pub fn scenario_table(scenarios: &[Scenario]) -> Result<Table> {
+    let (leaves, columns) = columns();
+    let rows = scenarios.iter().map(|scenario| row(scenario, &leaves, &columns)).collect::<Result<_>>()?;
+    Ok(Table { columns, rows, ..Table::default() })
 }
 
-/// Writes a table with one row per scenario and series as lists. The caller has checked that the scenarios can be read
-/// back.
-fn write_table(path: &Path, format: TableFormat, scenarios: &[&Scenario]) -> Result<()> {
-    let synthetic = scenarios.iter().any(|scenario| scenario.synthetic);
-    let facts = TableMetadata { table: "scenarios", synthetic, ..TableMetadata::default() };
-    let (leaves, columns) = (leaves(), scenario_columns());
-    let mut table = TableWriter::create(path, format, columns.clone(), &facts)?;
-    for scenario in scenarios {
-        let cannot = |e: &dyn std::fmt::Display| Error::Internal(format!("scenario {}: {e}", scenario.id));
-        let value = serde_json::to_value(scenario).map_err(|e| cannot(&e))?;
-        let cell = |(leaf, column): (&Leaf, &Column)| cell(leaf.of(&value), column.kind);
-        let row: Option<Vec<Cell>> = leaves.iter().zip(&columns).map(cell).collect();
-        table.row(&row.ok_or_else(|| cannot(&"a field is of another type than its column"))?)?;
-    }
-    table.finish()
+fn columns() -> (Vec<Leaf>, Vec<Column>) {
+    let leaves = leaves();
+    let columns = leaves.iter().map(Leaf::column).collect();
+    (leaves, columns)
+}
+
+fn row(scenario: &Scenario, leaves: &[Leaf], columns: &[Column]) -> Result<Vec<Cell<'static>>> {
+    let cannot = |e: &dyn std::fmt::Display| Error::Internal(format!("scenario {}: {e}", scenario.id));
+    let value = serde_json::to_value(scenario).map_err(|e| cannot(&e))?;
+    let cells: Option<_> =
+        leaves.iter().zip(columns).map(|(leaf, column)| cell(leaf.of(&value), column.kind)).collect();
+    cells.ok_or_else(|| cannot(&"a field is of another type than its column"))
 }
 
 /// Converts a JSON value to a cell; `None` if the value does not match the column's kind.
-fn cell(value: &Value, kind: ColumnKind) -> Option<Cell<'_>> {
+fn cell(value: &Value, kind: ColumnKind) -> Option<Cell<'static>> {
     let numbers = || value.as_array();
     Some(match (value, kind) {
         (Value::Null, _) => Cell::Null,
-        (_, ColumnKind::Text | ColumnKind::Name) => Cell::text(value.as_str()?),
+        (_, ColumnKind::Text | ColumnKind::Name) => Cell::text(value.as_str()?.to_owned()),
         (_, ColumnKind::Flag) => Cell::Flag(value.as_bool()?),
         (_, ColumnKind::Whole) => Cell::Whole(value.as_i64()?),
         (_, ColumnKind::Binary32 | ColumnKind::Binary64) => Cell::Number(value.as_f64()?),

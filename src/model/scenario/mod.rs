@@ -27,7 +27,9 @@ pub use case_parameters::{CaseParameters, NamedNumber};
 pub use case_quantity::{CaseNumber, CaseQuantity, GAP_ERROR_M, KMH, NUMBERS, SPEED_ERROR_MPS};
 pub use check::problem_of;
 pub use columns::HELP as COLUMNS_HELP;
-pub use file::{check_scenario_file, read_scenario_file, read_scenarios, write_scenarios, write_scenarios_to};
+pub use file::{
+    check_scenario_file, read_scenario_file, read_scenarios, scenario_table, write_scenarios, write_scenarios_to,
+};
 pub use found::{ScenarioFile, usable};
 pub use mined::{Ego, Other, Scenario, Side, mined_id};
 pub use parameter_table::{CaseRow, ParameterRows, RowPlace};
