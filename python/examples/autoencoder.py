@@ -46,9 +46,9 @@ def main() -> None:
     folds = lanesweep.study(scenarios=mined, categories=given.category).table("folds").to_polars()
     rows = mined.table("scenarios").to_polars().join(folds.select("id", "fold"), on="id", maintain_order="left")
     z, of = recipes.vectors(rows), rows["fold"].to_numpy()
-    weights = recipes.fit_description(rows, given.size).weights
     reproduced = np.empty_like(z)
     for fold in np.unique(of):
+        weights = recipes.fit_description(rows.filter(pl.Series(of != fold)), given.size).weights
         reproduced[of == fold] = reproduce(z[of != fold], z[of == fold], weights, given.size)
     external = {f"autoencoder-{given.size}": recipes.of_vectors(reproduced, rows)}
     study = lanesweep.study(scenarios=mined, categories=given.category, external=external, out=given.out)

@@ -1,4 +1,4 @@
-"""A driver in JAX: `python driver_in_jax.py`. Needs the package `jax`.
+"""A driver in JAX: `python driver_in_jax.py`. Needs `jax` and `pandas`.
 
 A jitted function is compiled for one shape, and the number of running lanes shrinks. So the arrays are padded to the size of
 the batch; what is computed for lanes that have ended is left out.

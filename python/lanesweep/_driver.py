@@ -253,6 +253,8 @@ def register(driver: Driver, known_as: str | None = None) -> str:
                 compiled = _address(driver), numbers, int(driver.state_rows), in_python
             elif not in_python:
                 raise TypeError(f"driver {name}: it has neither `acceleration` nor `compiled`")
+            if not (isinstance(name, str) and isinstance(driver.attention, str) and isinstance(driver.may_accelerate, (bool, np.bool_))):
+                raise TypeError(f"driver {name}: `name` and `attention` are texts, `may_accelerate` is True or False")
             _core.register(name, identity.rpartition("@")[2], driver, driver.may_accelerate, driver.attention, compiled)
             _registered[identity] = driver
         _named[name.casefold()] = driver

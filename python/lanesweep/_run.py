@@ -35,8 +35,7 @@ def progress() -> tuple[Callable[[str, int, int | None], None] | None, Callable[
 
     The bar is that of `tqdm` if it is installed; in a terminal or notebook only.
     """
-    is_seen = (sys.stderr is not None and sys.stderr.isatty()) or "ipykernel" in sys.modules
-    if not is_seen or importlib.util.find_spec("tqdm") is None:
+    if importlib.util.find_spec("tqdm") is None or not ((sys.stderr is not None and sys.stderr.isatty()) or "ipykernel" in sys.modules):
         return None, lambda: None
     with warnings.catch_warnings():
         # Without ipywidgets, tqdm draws its bar as text and warns about it.
@@ -136,15 +135,13 @@ def table_file(table: Any, path: Path) -> str:
     file = f"{path}.parquet"
     if hasattr(table, "write_parquet"):
         table.write_parquet(file)
-    elif hasattr(table, "to_csv"):
-        try:
-            table.to_parquet(file, index=False)
-        except ImportError:
-            file = f"{path}.csv"
-            table.to_csv(file, index=False)
+    elif hasattr(table, "to_csv") and importlib.util.find_spec("pyarrow") is None:
+        file = f"{path}.csv"
+        table.to_csv(file, index=False)
     else:
         arrow: Any = importlib.import_module("pyarrow")
-        importlib.import_module("pyarrow.parquet").write_table(arrow.table(table), file)
+        made = arrow.Table.from_pandas(table, preserve_index=False) if hasattr(table, "to_csv") else arrow.table(table)
+        importlib.import_module("pyarrow.parquet").write_table(made, file)
     return file
 
 

@@ -31,9 +31,10 @@ def _column(name: str, values: Any) -> Any:
         raise _core.InputError(f"column `{name}` has the shape {array.shape}: give one value per case, or one for all")
     if array.dtype.kind in "biuf":
         return array.astype(np.float64)
-    items = [None if value is None or type(value).__name__ == "NAType" or value != value else value for value in array.reshape(-1).tolist()]
-    if array.dtype.kind in "cmM" or not all(isinstance(value, (str, SupportsFloat, type(None))) for value in items):
+    items = [None if type(value).__name__ == "NAType" else value for value in array.reshape(-1).tolist()]
+    if array.dtype.kind in "cmM" or any(getattr(value, "ndim", 0) or not isinstance(value, (str, SupportsFloat, type(None))) for value in items):
         raise _core.InputError(f"column `{name}` holds {array.dtype}; expected numbers, or texts such as 60km/h")
+    items = [value if value == value else None for value in items]
     if any(isinstance(value, str) for value in items):
         # A number beside texts may need no unit.
         return np.array([value if value is None else str(value) for value in items], dtype=object).reshape(array.shape)
@@ -128,7 +129,7 @@ def simulate(
         # Columns of the type Null, which cannot be handed over and say nothing.
         cases = cases.select([name for name, kind in cases.schema.items() if str(kind) != "Null"])
     given: dict[str, Any] = {"category": category, "dt": dt, "reference": reference, "accept_implausible": accept_implausible}
-    given |= {"models": names_of(models), "thw": [] if thw is None else words_of(plain(thw, "thw"))}
+    given |= {"models": names_of(models), "thw": [] if thw is None else words_of(thw if isinstance(thw := plain(thw, "thw"), (list, dict)) else [thw])}
     try:
         frame, notes = _core.simulate(cases, given | _where(profile, backend, device), on_message)
     except (TypeError, ValueError) as error:

@@ -121,6 +121,8 @@ def join(plan: Plan, parts: Iterable[Part], *, out: str | os.PathLike[str] | Non
     (folder / "plan.json").write_bytes(plan.content)
     names = {"plan.json"}
     for name, content in (file for part in parts for file in part.items()):
+        if Path(name).name != name or not name.startswith("part-"):
+            raise InputError(f"`{name}` is no file of a part")
         if name in names:
             raise InputError(f"{name} is there twice: give every part once")
         names.add(name)

@@ -75,14 +75,14 @@ fn open(arguments: &Arguments) -> Result<Opened> {
         None => SampleHeadways::Sampled,
         Some(text) => SampleHeadways::Each(vec![headway_of(text)?]),
     };
-    let backend = OpenBackend::open(arguments.backend.parse()?, arguments.device.as_deref())?;
     let opened = Opened {
         density: read_density(&arguments.density)?,
         profile: Profile::load(&arguments.profile)?,
         model: model_of(&arguments.model)?,
         criterion: Criterion::parse(&arguments.criterion).ok_or_else(unknown)?,
         headway,
-        backend: backend.with_cancel(embedded::token()),
+        backend: OpenBackend::open(arguments.backend.parse()?, arguments.device.as_deref())?
+            .with_cancel(embedded::token()),
     };
     // A wrong headway is an error of the construction, not of the first call.
     opened.values(&[opened.density.kde.points()[0].clone()])?;

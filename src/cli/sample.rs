@@ -52,7 +52,8 @@ pub(crate) struct Sample {
     pub(super) rows: Option<PathBuf>,
     /// Also write the first failing lanes of each model and criterion: .csv, .jsonl or .parquet
     ///
-    /// The first 1000, or sample.failures_limit; with the columns of --rows. For a run in parts: `merge --failures`.
+    /// The first 1000, or sample.failures_limit; with the columns of --rows. With importance sampling it may take as
+    /// long as the run, on the CPU. For a run in parts: `merge --failures`.
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub(super) failures: Option<PathBuf>,
     /// Proposal file to sample, with --estimator is

@@ -4,7 +4,7 @@ use crate::common::mined::{density_of, write_cut_in_density};
 use crate::common::program::{json, ran, refused, table};
 use crate::common::{self, Folder, folder, program};
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use lanesweep::engine::{Backend, SampleTally};
@@ -69,6 +69,9 @@ fn a_run_in_parts_is_the_run_in_one_and_its_failing_lanes_are_the_first_of_all_r
     let read = |path: &str| std::fs::read_to_string(dir.join(path)).unwrap();
     let rows = read("rows.csv");
     assert_eq!(rows.lines().count(), 1 + 20_000 * 2 * MODELS);
+    let course = table(&dir.join("whole/tables/convergence.csv"));
+    let after: BTreeSet<u64> = course.iter().map(|row| row["samples"].parse().unwrap()).collect();
+    assert_eq!(Vec::from_iter(after), [4096, 8192, 16_384, 20_000]);
     let (all, seven) = (first_failing(&rows, 1000), first_failing(&rows, 7));
     assert!(all.lines().count() > 1000 && (7..=7 * 3 * MODELS).contains(&seven.lines().count()));
     let listed = |path: &str| first_failing(&read(path), usize::MAX);

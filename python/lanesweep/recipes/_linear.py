@@ -41,7 +41,8 @@ def fit_description(scenarios: Any, size: int, emphasis: npt.ArrayLike | None = 
 
 def replayed(description: Description, scenarios: Any) -> pl.DataFrame:
     """Return scenarios as the description keeps them: an S' for `study(external=…)`."""
-    return of_vectors(_decoded(description, vectors(scenarios)), scenarios)
+    rows = table(scenarios, "category", "target_v", "fps")
+    return of_vectors(_decoded(description, vectors(rows)), rows)
 
 
 def found_emphasis(
@@ -113,6 +114,9 @@ def of_vectors(z: Array, scenarios: Any) -> pl.DataFrame:
     rows = table(scenarios, "category", "target_v", "fps")
     category = _category(rows)
     series, numbers = _LAYOUT[category]
+    z, expected = np.asarray(z, dtype=np.float64), (rows.height, INSTANTS * len(series) + len(numbers))
+    if z.shape != expected:
+        raise InputError(f"the vectors have the shape {z.shape}; expected {expected}, as `vectors` makes them")
     found = {name: z[:, INSTANTS * at : INSTANTS * (at + 1)] for at, name in enumerate(series)}
     found |= {name: z[:, at - len(numbers)] for at, name in enumerate(numbers)}
     # A vehicle does not drive backwards, and a motion lasts.
@@ -141,7 +145,7 @@ def _scores(rows: pl.DataFrame, described: Mapping[str, pl.DataFrame], criterion
 
 
 def vectors(scenarios: Any) -> Array:
-    """Return scenarios of one category as vectors, a row each: the series at 50 equidistant instants, then speed, gap and duration."""
+    """Return scenarios of one category as vectors, a row each: the series at 50 equidistant instants, then the numbers of the category."""
     rows = table(scenarios, "category", "target_v", "fps")
     series, numbers = _LAYOUT[_category(rows)]
 

@@ -50,7 +50,7 @@ pub(crate) struct Settings {
 fn profile_help() -> String {
     let names = Profile::names().collect::<Vec<_>>().join(", ");
     format!(
-        "{names}. Name of a profile, or a TOML file of your own. `map --preset jrc` takes jrc-2021 unless it is set."
+        "Name of a profile, or a TOML file of your own. Profiles: {names}. `map --preset jrc` takes jrc-2021 unless it is set."
     )
 }
 
@@ -143,7 +143,7 @@ config_tables! {
         #[schemars(extend("x-flag" = "time_limit", "x-verbs" = ["sample"], "x-heading" = MODELS))]
         pub time_limit_s: Option<f64> = None,
         /// What importance sampling rests on. `draws` of the density bound what its search missed; the `search` alone costs
-        /// 15,000 to 60,000 lanes a question, for drivers that take a millisecond a lane, and bounds nothing.
+        /// 20,000 to 65,000 lanes a question as a rule, for drivers that take a millisecond a lane, and bounds nothing.
         #[schemars(extend("x-flag" = "assurance", "x-verbs" = ["sample"], "x-heading" = MODELS))]
         pub assurance: Assurance = Assurance::Draws,
         /// Lanes of each model and criterion in the table of failures, at most.

@@ -16,7 +16,7 @@ pub(crate) struct Rules {
     is_seldom: bool,
     /// The sweep returns only verdicts: minima and maxima are not gathered.
     pub is_verdict_only: bool,
-    /// The sweep returns values, so measures are gathered. Rarely used rules gather minima and maxima for verdicts too.
+    /// Measures are gathered: the sweep returns values, or the rules are rarely used.
     pub keeps_measures: bool,
 }
 

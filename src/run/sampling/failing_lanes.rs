@@ -101,7 +101,7 @@ impl Sample {
                     Ok(failures.into_par_iter().map(sampled).collect())
                 };
                 let all = 0..draws.draws;
-                let samples = pieces(&[all], self.chunk_samples(draws.crude_per_draw));
+                let samples = pieces(std::slice::from_ref(&all), self.chunk_samples(draws.crude_per_draw));
                 self.find(Missing::new(models, limit, counted), samples, executor, each, drawn)
             }
             _ => Err(Error::Internal("a run without counts has no failing lanes".to_owned())),
@@ -112,12 +112,12 @@ impl Sample {
     fn find(
         &self,
         mut missing: Missing,
-        pieces: Vec<Range<u64>>,
+        pieces: impl Iterator<Item = Range<u64>> + Clone,
         executor: &Executor,
         each: Each,
         drawn: impl Fn(&Missing, Range<u64>) -> Result<Vec<SampledPoint>>,
     ) -> Result<()> {
-        let all = pieces.iter().map(|piece| piece.end - piece.start).sum();
+        let all = pieces.clone().map(|piece| piece.end - piece.start).sum();
         let mut done = 0;
         for piece in pieces {
             let open: Vec<usize> = (0..self.options.models.len()).filter(|model| missing.has_model(*model)).collect();
@@ -158,12 +158,12 @@ impl Sample {
 }
 
 /// Ranges of samples in pieces that are drawn together.
-fn pieces(samples: &[Range<u64>], size: u64) -> Vec<Range<u64>> {
-    let of = |range: &Range<u64>| {
+fn pieces(samples: &[Range<u64>], size: u64) -> impl Iterator<Item = Range<u64>> + Clone {
+    let of = move |range: &Range<u64>| {
         let end = range.end;
         range.clone().step_by(size as usize).map(move |start| start..end.min(start + size))
     };
-    samples.iter().flat_map(of).collect()
+    samples.iter().flat_map(of)
 }
 
 /// The cells of a model and criterion, from every headway.
