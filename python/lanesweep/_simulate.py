@@ -129,7 +129,8 @@ def simulate(
         # Columns of the type Null, which cannot be handed over and say nothing.
         cases = cases.select([name for name, kind in cases.schema.items() if str(kind) != "Null"])
     given: dict[str, Any] = {"category": category, "dt": dt, "reference": reference, "accept_implausible": accept_implausible}
-    given |= {"models": names_of(models), "thw": [] if thw is None else words_of(thw if isinstance(thw := plain(thw, "thw"), (list, dict)) else [thw])}
+    headways: Any = [] if thw is None else plain(thw, "thw")
+    given |= {"models": names_of(models), "thw": words_of(headways if isinstance(headways, (list, dict)) else [headways])}
     try:
         frame, notes = _core.simulate(cases, given | _where(profile, backend, device), on_message)
     except (TypeError, ValueError) as error:

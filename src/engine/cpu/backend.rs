@@ -105,7 +105,11 @@ impl Backend for CpuBackend {
 
     fn prepare<'p>(&self, plan: &'p LanePlan) -> Result<Box<dyn Session + 'p>> {
         if self.is_reference {
-            ModelId::refuse_foreign(&plan.models, "the reference in binary64", "compute in binary32")?;
+            ModelId::refuse_foreign(
+                &plan.models,
+                "the reference in binary64",
+                "leave out `reference` or `compare_reference`",
+            )?;
             return Ok(lane_by_lane(plan, LaneRunner::<f64>::new(plan)));
         }
         let (runner, instructions) = (LaneRunner::<f32>::new(plan).every_step(self.every_step), self.instructions);
