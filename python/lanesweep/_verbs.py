@@ -144,8 +144,8 @@ def study(
     models : Models
         Driver models: Reg157, CCHDM, RSS, FSM, by default all.
     profile : Path
-        paper, paper-fit, jrc-2021, un-r157, eu-2022-1426, eu-2022-1426-standing. Name of a profile, or a TOML file of
-        your own. `map --preset jrc` takes jrc-2021 unless it is set.
+        Name of a profile, or a TOML file of your own. Profiles: paper, paper-fit, jrc-2021, un-r157, eu-2022-1426,
+        eu-2022-1426-standing. `map --preset jrc` takes jrc-2021 unless it is set.
     dt : Number, s
         Time step, by default the profile's.
     out : Path
@@ -398,8 +398,8 @@ def sample(
     models : Models
         Driver models: Reg157, CCHDM, RSS, FSM, by default all.
     profile : Path
-        paper, paper-fit, jrc-2021, un-r157, eu-2022-1426, eu-2022-1426-standing. Name of a profile, or a TOML file of
-        your own. `map --preset jrc` takes jrc-2021 unless it is set.
+        Name of a profile, or a TOML file of your own. Profiles: paper, paper-fit, jrc-2021, un-r157, eu-2022-1426,
+        eu-2022-1426-standing. `map --preset jrc` takes jrc-2021 unless it is set.
     dt : Number, s
         Time step, by default the profile's.
     estimator : Literal["auto", "mc", "is"]
@@ -418,12 +418,13 @@ def sample(
         Stop at the first check after this time (not reproducible), by default no limit.
     assurance : Literal["draws", "search"]
         What importance sampling rests on. `draws` of the density bound what its search missed; the `search` alone costs
-        15,000 to 60,000 lanes a question, for drivers that take a millisecond a lane, and bounds nothing.
+        20,000 to 65,000 lanes a question as a rule, for drivers that take a millisecond a lane, and bounds nothing.
     rows : Path
         Also write one row per lane: .csv, .jsonl or .parquet.
     failures : Path
         Also write the first failing lanes of each model and criterion: .csv, .jsonl or .parquet. The first 1000, or
-        sample.failures_limit; with the columns of `rows`. For a run in parts: `merge --failures`.
+        sample.failures_limit; with the columns of `rows`. With importance sampling it may take as long as the run, on
+        the CPU. For a run in parts: `merge --failures`.
     out : Path
         Folder for estimate.json, tables and figures.
     config : Config
@@ -503,8 +504,8 @@ def map(
         Mark cells whose outcome changes with a tenth of the time step, 1 cm or 0.1 km/h. They are undecided. Each cell
         is simulated eight times; sheets show undecided cells in their own colour.
     profile : Path
-        paper, paper-fit, jrc-2021, un-r157, eu-2022-1426, eu-2022-1426-standing. Name of a profile, or a TOML file of
-        your own. `map --preset jrc` takes jrc-2021 unless it is set.
+        Name of a profile, or a TOML file of your own. Profiles: paper, paper-fit, jrc-2021, un-r157, eu-2022-1426,
+        eu-2022-1426-standing. `map --preset jrc` takes jrc-2021 unless it is set.
     dt : Number, s
         Time step, by default the profile's.
     out : Path
@@ -680,8 +681,8 @@ def trace(
     models : Models
         Driver models: Reg157, CCHDM, RSS, FSM, by default all.
     profile : Path
-        paper, paper-fit, jrc-2021, un-r157, eu-2022-1426, eu-2022-1426-standing. Name of a profile, or a TOML file of
-        your own. `map --preset jrc` takes jrc-2021 unless it is set.
+        Name of a profile, or a TOML file of your own. Profiles: paper, paper-fit, jrc-2021, un-r157, eu-2022-1426,
+        eu-2022-1426-standing. `map --preset jrc` takes jrc-2021 unless it is set.
     dt : Number, s
         Time step, by default the profile's.
     plot : Path
