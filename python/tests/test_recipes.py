@@ -448,5 +448,8 @@ def test_a_description_without_emphasis_is_the_decomposition_of_the_study(scenar
     f1 = pl.DataFrame(lanesweep.study(scenarios=kept, categories="lvd", external={"ours": ours}).table("results"))
     counts = {key: f1.filter(variant=key, headway="all").select("tp", "fn", "fp", "tn").rows() for key in ("iii", "ours")}
     assert counts["ours"] == counts["iii"] and len(counts["iii"]) == 12
+    # A number that all scenarios share, here a duration of 1 s, stays what it is.
+    alike = kept.with_columns(fps=pl.col("target_v").list.len() - 1.0)
+    assert recipes.replayed(recipes.fit_description(alike, 3), alike)["fps"].to_numpy() == pytest.approx(49.0)
     emphasis, score = recipes.found_emphasis(kept, 3, evaluations=12)
     assert emphasis.shape == (5,) and 0.5 < score <= 1.0

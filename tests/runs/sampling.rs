@@ -69,6 +69,8 @@ fn a_run_in_parts_is_the_run_in_one_and_its_failing_lanes_are_the_first_of_all_r
     let read = |path: &str| std::fs::read_to_string(dir.join(path)).unwrap();
     let rows = read("rows.csv");
     assert_eq!(rows.lines().count(), 1 + 20_000 * 2 * MODELS);
+    let weight = rows.lines().next().unwrap().split(',').position(|name| name == "weight").unwrap();
+    assert!(rows.lines().skip(1).all(|row| row.split(',').nth(weight) == Some("")));
     let course = table(&dir.join("whole/tables/convergence.csv"));
     let after: BTreeSet<u64> = course.iter().map(|row| row["samples"].parse().unwrap()).collect();
     assert_eq!(Vec::from_iter(after), [4096, 8192, 16_384, 20_000]);
@@ -193,9 +195,13 @@ fn the_weights_of_all_failing_lanes_add_up_to_p_and_those_of_the_density_to_its_
         ran(dir, &format!("{base} {how} --failures {out}.csv --out {out} --backend cpu"));
         let rows = table(&dir.join(out).with_extension("csv"));
         let number = |row: &BTreeMap<String, String>, column: &str| row[column].parse::<f64>().unwrap();
+        let course = table(&dir.join(out).join("tables/convergence.csv"));
         for estimate in table(&dir.join(out).join("estimates.csv")).iter().filter(|row| row["headway"] != "all") {
             let is_same =
                 |row: &BTreeMap<String, String>| ["headway", "model"].iter().all(|of| row[*of] == estimate[*of]);
+            let is_its = |row: &&BTreeMap<String, String>| is_same(row) && row["criterion"] == estimate["criterion"];
+            let last = course.iter().rfind(is_its);
+            assert_eq!(last.map(|row| &row["probability"]), (out == "is").then_some(&estimate["probability"]));
             let failing = rows.iter().filter(|row| is_same(row) && row[&estimate["criterion"]] == "1");
             let (mut p, mut of_density) = (0.0, 0.0);
             for row in failing {

@@ -84,7 +84,9 @@ def _fit(z: Array, category: str, size: int, emphasis: npt.ArrayLike | None) -> 
     # Positions on one side have the distance from the middle of the lane as their unit, not their own spread.
     is_lateral = np.array([[name == "target_y"] for name in series])
     spread = np.sqrt(((parts - np.where(is_lateral, 0.0, parts.mean(axis=0))) ** 2).mean(axis=0)).mean(axis=1)
-    weights = np.r_[np.repeat(1.0 / (INSTANTS * spread), INSTANTS), 1.0 / z[:, -len(numbers) :].std(axis=0)]
+    # A number that is the same in all scenarios has no spread.
+    spread, spreads = (np.maximum(of, 1e-9) for of in (spread, z[:, -len(numbers) :].std(axis=0)))
+    weights = np.r_[np.repeat(1.0 / (INSTANTS * spread), INSTANTS), 1.0 / spreads]
     if emphasis is not None:
         theta = np.asarray(emphasis, dtype=np.float64)
         knots = theta[: -len(numbers)].reshape(len(series), KNOTS)

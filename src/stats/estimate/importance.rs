@@ -64,7 +64,7 @@ pub struct WeightedFailure {
     pub is_crude: bool,
     /// The draw of the proposal that it is or belongs to.
     pub draw: u64,
-    /// 1/(m + g/f).
+    /// 1/(m + g/f), with m draws of the density f for each draw of the proposal g.
     pub weight: f64,
 }
 
