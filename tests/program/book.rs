@@ -189,6 +189,17 @@ const CASE: &str = "simulate --category cut-in --models all --ego-speed 30m/s --
 #[test]
 #[ignore = "half a minute and more: .ci/run long-tests"]
 fn figures_are_what_their_commands_draw() {
+    drawn_again(|command| !command.contains("--robust"));
+}
+
+#[test]
+#[ignore = "minutes: .ci/long"]
+fn robust_figures_are_what_their_commands_draw() {
+    drawn_again(|command| command.contains("--robust"));
+}
+
+/// Draws figures of the book again, of which every one has its command.
+fn drawn_again(is_meant: fn(&str) -> bool) {
     let mut listed: Vec<&str> = FIGURES.iter().map(|(figure, ..)| *figure).collect();
     listed.sort_unstable();
     let folder = root().join("docs/src/figures");
@@ -196,7 +207,7 @@ fn figures_are_what_their_commands_draw() {
         names(&folder).into_iter().filter(|name| name.ends_with(".svg") && name != OF_ROWS).collect();
     present.sort_unstable();
     assert_eq!(present, listed, "every figure has its command");
-    for (figure, command, drawn) in FIGURES {
+    for (figure, command, drawn) in FIGURES.into_iter().filter(|(_, command, _)| is_meant(command)) {
         let dir = tempfile::tempdir().unwrap();
         ran(dir.path(), &format!("-q {}", command.replace("OUT", dir.path().to_str().unwrap())));
         let now = fs::read(dir.path().join(drawn)).unwrap();
