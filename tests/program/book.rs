@@ -189,17 +189,17 @@ const CASE: &str = "simulate --category cut-in --models all --ego-speed 30m/s --
 #[test]
 #[ignore = "half a minute and more: .ci/run long-tests"]
 fn figures_are_what_their_commands_draw() {
-    drawn_again(|command| !command.contains("--robust"));
+    assert_drawn_alike(false);
 }
 
 #[test]
-#[ignore = "minutes: .ci/long"]
+#[ignore = "a minute: .ci/long"]
 fn robust_figures_are_what_their_commands_draw() {
-    drawn_again(|command| command.contains("--robust"));
+    assert_drawn_alike(true);
 }
 
-/// Draws figures of the book again, of which every one has its command.
-fn drawn_again(is_meant: fn(&str) -> bool) {
+/// Every figure of the book has its command. Those with `--robust`, or those without, are what their commands draw now.
+fn assert_drawn_alike(is_robust: bool) {
     let mut listed: Vec<&str> = FIGURES.iter().map(|(figure, ..)| *figure).collect();
     listed.sort_unstable();
     let folder = root().join("docs/src/figures");
@@ -207,7 +207,9 @@ fn drawn_again(is_meant: fn(&str) -> bool) {
         names(&folder).into_iter().filter(|name| name.ends_with(".svg") && name != OF_ROWS).collect();
     present.sort_unstable();
     assert_eq!(present, listed, "every figure has its command");
-    for (figure, command, drawn) in FIGURES.into_iter().filter(|(_, command, _)| is_meant(command)) {
+    let mut meant = FIGURES.into_iter().filter(|(_, command, _)| command.contains("--robust") == is_robust).peekable();
+    assert!(meant.peek().is_some(), "no figure is drawn");
+    for (figure, command, drawn) in meant {
         let dir = tempfile::tempdir().unwrap();
         ran(dir.path(), &format!("-q {}", command.replace("OUT", dir.path().to_str().unwrap())));
         let now = fs::read(dir.path().join(drawn)).unwrap();

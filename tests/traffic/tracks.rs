@@ -523,7 +523,7 @@ fn every_preset_reads_its_own_format_and_finds_mistakes_in_it() {
         let path = dir.path().join(if is_parquet { "own.parquet" } else { "own.csv" });
         let stride = 4;
         // The rate where only a meta file or the format says it.
-        let rate = (!preset.columns.contains_key(&Role::Time)).then_some(6.25);
+        let rate = (!preset.columns.contains_key(&Role::Time)).then_some(recording.frame_rate_hz / stride as f64);
         let preset = Preset { frame_rate_hz: rate, smoothing_s: None, vehicles: None, recording: None, ..preset };
         let understood = |mistake: Mistake| {
             let text = in_format_of(&preset, &recording, stride, mistake);
